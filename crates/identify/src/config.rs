@@ -79,6 +79,8 @@ pub struct IdentifyConfig {
     pub humidity_sigma_kg_kg: f64,
     /// Pressure at which an isothermal zero has compared the pressure sensors, Pa: their gain errors count from there; 0 without a zero.
     pub rest_pressure_pa: f64,
+    /// Declared play of the back-pressure valve, opening.
+    pub valve_play_ratio: f64,
     /// Error that all absolute pressures share, one standard deviation, Pa: of the barometer to which gauge pressures are added, and what an
     /// isothermal zero cannot show.
     pub barometer_sigma_pa: f64,
@@ -126,6 +128,7 @@ impl Default for IdentifyConfig {
             turbine_gas: Gas::CLOSED_FORM_AIR,
             humidity_sigma_kg_kg: 0.0,
             rest_pressure_pa: 0.0,
+            valve_play_ratio: 0.0,
             barometer_sigma_pa: 0.0,
             barometer_pa: None,
             thermometer_sigma_k: 0.0,

@@ -7,7 +7,7 @@
 #![allow(clippy::print_stdout, reason = "the table is what a person looks at who changes a balance")]
 
 use crate::lab::{Machine as LabMachine, campaign, measured};
-use mapper_core::{Channel, Method, ModelTolerances, Recording, Verdict};
+use mapper_core::{Channel, FaultKind, Method, ModelTolerances, Recording, Verdict};
 use mapper_identify::{Identified, IdentifyConfig, Machine, NominalRig, Suspect, identify_recording};
 use mapper_physics::rig::sensor_fault::additive;
 use mapper_physics::simulation::model::Model;
@@ -117,6 +117,35 @@ fn another_valve_is_named_and_leaves_the_points_as_they_are() {
     assert!((fault.value - 0.05).abs() < 3.0 * fault.sigma.hypot(0.005), "{fault:?}");
 }
 
+/// A valve that stops 0.025 behind its command on either side is named with its play, declared play is none, and no point depends on either.
+#[test]
+fn a_valve_with_play_is_named_and_leaves_the_points_as_they_are() {
+    const PLAY: f64 = 0.05;
+    for seed in [9002, 9003] {
+        let mut drawn = drawn(seed);
+        let good = |identified: &Identified| {
+            identified.points.iter().flatten().filter(|point| point.verdict == Verdict::Good).count()
+        };
+        let good_as_commanded = good(&found(&drawn, &drawn.recording));
+        // The recorded flow is that of the true opening, so the commands are what is put ahead of it.
+        let mut before = 1.0;
+        for step in &mut drawn.recording.steps {
+            let moved: f64 = step.valve_opening_ratio - before;
+            before = step.valve_opening_ratio;
+            if moved != 0.0 {
+                step.valve_opening_ratio += 0.5 * PLAY * moved.signum();
+            }
+        }
+        let with_play = found(&drawn, &drawn.recording);
+        let [fault] = with_play.faults.as_slice() else { panic!("{:?}", with_play.faults) };
+        assert_eq!(fault.suspect, Suspect::Machine(Machine::ValvePlay));
+        assert!((fault.value - PLAY).abs() < 3.0 * fault.sigma, "{fault:?}");
+        assert_eq!(good(&with_play), good_as_commanded);
+        drawn.config.valve_play_ratio = PLAY;
+        assert!(found(&drawn, &drawn.recording).faults.is_empty());
+    }
+}
+
 #[test]
 fn faults_are_found_and_named_and_none_is_invented() {
     let seeds: Vec<u64> = (9000..9000 + machines()).collect();
@@ -137,7 +166,9 @@ fn faults_are_found_and_named_and_none_is_invented() {
         let outcomes: Vec<(usize, Outcome)> = (0..per_machine.min(tellable.len()))
             .map(|k| tellable[(*seed as usize * per_machine + k) % tellable.len()])
             .map(|(index, suspect, error)| {
-                let sign = if (*seed as usize + index).is_multiple_of(2) { 1.0 } else { -1.0 };
+                // A share of conduction is never negative.
+                let bounded = additive().nth(index).unwrap().kind == FaultKind::TowardsWall;
+                let sign = if bounded || (*seed as usize + index).is_multiple_of(2) { 1.0 } else { -1.0 };
                 (index, outcome(&drawn, &suspect, sign * SIGMAS * error))
             })
             .collect();

@@ -17,7 +17,7 @@ pub(crate) struct Rows {
     pub(crate) readings: Vec<Readings>,
     /// Derivatives of each residual by the readings.
     pub(crate) by_reading: Vec<PerChannel>,
-    /// Effect of a machine of another scale on each residual; empty if no machine is declared.
+    /// Effect of a machine of another scale or of a valve with play on each residual.
     pub(crate) by_machine: Vec<(Machine, Vec<f64>)>,
     /// Effects of faults of size 1 on each residual that differ from those of a constant error of the same size.
     pub(crate) by_fault: Vec<(Channel, FaultKind, Vec<f64>)>,
@@ -32,6 +32,8 @@ pub enum Machine {
     Efficiency,
     /// Area of the back-pressure valve.
     ValveArea,
+    /// Play of its drive beyond the declared one, opening.
+    ValvePlay,
     /// Heat transfer between gas and housing, all over.
     Convection,
     /// A condition of the rig, in the channel's unit.
@@ -39,10 +41,11 @@ pub enum Machine {
 }
 
 /// All of them, in the order of the parameters.
-pub(crate) const MACHINE: [Machine; 9] = [
+pub(crate) const MACHINE: [Machine; 10] = [
     Machine::FlowCapacity,
     Machine::Efficiency,
     Machine::ValveArea,
+    Machine::ValvePlay,
     Machine::Convection,
     Machine::Condition(Channel::P1),
     Machine::Condition(Channel::T1),

@@ -90,6 +90,7 @@ fn machine_name(machine: Machine) -> String {
         Machine::FlowCapacity => "flow of the declared map",
         Machine::Efficiency => "efficiency of the declared map",
         Machine::ValveArea => "area of the declared valve",
+        Machine::ValvePlay => "play of the back-pressure valve",
         Machine::Convection => "convection of the declared machine",
         Machine::Condition(channel) => return format!("{} ({channel})", channel.info().description),
     };

@@ -17,12 +17,13 @@ use crate::IdentifyConfig;
 use crate::faults::balance_rows::{MACHINE, Machine, Rows};
 use crate::faults::balances::conditions;
 use crate::faults::balances::efficiency::FittedEfficiencies;
+use crate::faults::balances::valve::{Opening, sides};
 use crate::faults::end_readings::{CHANNELS, MAX_CORRELATED_ROWS, Readings, span_s};
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
 use crate::reading_checks::ends::Ends;
 use crate::reading_checks::failed_check::FailedCheck;
-use mapper_core::{Channel, Method, ModelTolerances, Recording, SuspectedFault, Warning};
+use mapper_core::{Channel, FaultKind, Method, ModelTolerances, Recording, SuspectedFault, Warning};
 use mapper_inference::hypotheses::{Likelihood, Member, Priors};
 use mapper_inference::mixture::MIN_WEIGHT;
 use mapper_inference::posterior::EXCLUDED_ODDS;
@@ -36,6 +37,9 @@ const OTHER_MACHINE_RATIO: f64 = 0.05;
 /// The same of convection. Source: correlations of heat transfer in pipes scatter by that much (Incropera, ch. 8.5).
 const OTHER_CONVECTION_RATIO: f64 = 0.2;
 
+/// Play of a worn drive, opening, one standard deviation. Bound: twice that of a new pneumatic positioner.
+const OTHER_PLAY: f64 = 0.04;
+
 /// All balances of a recording, and the prior of the parameters. `ends`: of the usable steps. `fitted`: efficiencies of the joint fit, if
 /// available.
 pub(crate) fn likelihood(
@@ -47,10 +51,12 @@ pub(crate) fn likelihood(
 ) -> Option<(Likelihood, Priors)> {
     let all = all_readings(recording, ends, config.rest_pressure_pa)?;
     let readings: Vec<Readings> = all.iter().flatten().copied().collect();
-    let opening = |(end, readings): (&Option<Ends>, &Option<Readings>)| {
-        Some((end.as_ref()?.valve_opening_ratio, (*readings)?))
+    let opening = |((end, readings), side): ((&Option<Ends>, &Option<Readings>), f64)| {
+        let position = end.as_ref()?.valve_opening_ratio - 0.5 * config.valve_play_ratio * side;
+        Some((Opening { position, side }, (*readings)?))
     };
-    let opened: Vec<(f64, Readings)> = ends.iter().zip(&all).filter_map(opening).collect();
+    let opened: Vec<(Opening, Readings)> =
+        ends.iter().zip(&all).zip(sides(&recording.steps)).filter_map(opening).collect();
     let noise = end_readings::noise(config, recording);
     let reference = config.reference;
     let mut balances: Vec<Rows> = Vec::new();
@@ -93,7 +99,7 @@ pub(crate) fn find(likelihood: &Likelihood, priors: &Priors, method: Method) -> 
 fn touches_points(suspect: Suspect, method: Method) -> bool {
     let housing = method == Method::Steady && suspect.channels() == [Channel::Tc];
     let measured = |machine| match machine {
-        Machine::ValveArea | Machine::Condition(_) => true,
+        Machine::ValveArea | Machine::ValvePlay | Machine::Condition(_) => true,
         Machine::FlowCapacity | Machine::Efficiency | Machine::Convection => false,
     };
     !(housing || matches!(suspect, Suspect::Machine(machine) if measured(machine)))
@@ -162,9 +168,17 @@ fn priors(config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Priors {
         Machine::Condition(channel) => {
             EXCLUDE_SIGMAS * conditions::tolerance(*channel, &tolerances).unwrap_or(1.0)
         }
+        Machine::ValvePlay => OTHER_PLAY,
         Machine::FlowCapacity | Machine::Efficiency | Machine::ValveArea => OTHER_MACHINE_RATIO,
     });
     let sigmas: Vec<f64> = additive().map(|fault| fault.sigma).chain(machine).collect();
     let always = offsets.chain(CHANNELS.iter().map(gain)).chain([config.barometer_sigma_pa]).collect();
-    Priors::even(always, &sigmas, EXPECTED_FAULTS)
+    let mut priors = Priors::even(always, &sigmas, EXPECTED_FAULTS);
+    for (index, hypothesis) in priors.hypotheses.iter_mut().enumerate() {
+        hypothesis.at_least_zero = match suspect(index) {
+            Suspect::Sensor(fault) => fault.kind == FaultKind::TowardsWall,
+            Suspect::Machine(machine) => machine == Machine::ValvePlay,
+        };
+    }
+    priors
 }

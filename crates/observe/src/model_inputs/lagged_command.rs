@@ -128,7 +128,7 @@ impl Path {
 }
 
 /// Opening from which a valve moves to the first one of a recording. Source: safe state of a stand, the valve at its nominal area.
-const SAFE_OPENING: f64 = 1.0;
+pub const SAFE_OPENING: f64 = 1.0;
 
 impl LaggedCommand {
     /// The response to `levels` (rising in time, at least one) from steady state.
@@ -333,23 +333,28 @@ pub fn measured_valve_response(
     let openings: Vec<f64> = openings.iter().map(|x| x / area_m2).collect();
     let sizes: Vec<f64> = jumping().map(openings_of).map(|(from, to)| (to - from).abs()).collect();
     let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
-    let with_play = |play: f64| {
-        let predict = |response: Response| {
-            let valve = Response { play, dead_band: declared.dead_band, ..response };
-            let command = commanded.with_responses(Response::lag(0.0), valve);
-            move |t_s: f64| command.valve_opening_ratio(t_s)
-        };
-        let found = estimate_response(table, &openings, &jumps, sizes.clone(), predict)?;
-        Some((sum_of_squares(table, &openings, &jumps, predict(found)), found))
+    let predict = |response: Response| {
+        let command = commanded.with_responses(Response::lag(0.0), response);
+        move |t_s: f64| command.valve_opening_ratio(t_s)
     };
+    let with_declared = |response: Response| {
+        predict(Response { play: declared.play, dead_band: declared.dead_band, ..response })
+    };
+    let found = estimate_response(table, &openings, &jumps, sizes, with_declared)?;
+    let found = Response { play: declared.play, dead_band: declared.dead_band, ..found };
+    let cost_of = |response: Response| sum_of_squares(table, &openings, &jumps, predict(response));
     // The play that the recording shows is the diagnosis' to name, but without it the lag would be longer.
-    let (without, plain) = with_play(declared.play)?;
-    let plays = UNDECLARED_PLAYS.into_iter().filter_map(|more| with_play(declared.play + more));
-    let best = plays.min_by(|a, b| a.0.total_cmp(&b.0));
+    let with_play = |more: f64| {
+        let with = |ln_lag: f64| Response { lag_s: ln_lag.exp(), play: declared.play + more, ..found };
+        let (low, high) = (found.lag_s / LAG_FACTOR, found.lag_s);
+        let best = minimise(low.ln(), high.ln(), DEAD_TIME_TOLERANCE, |ln_lag| cost_of(with(ln_lag)));
+        (best.value, best.at.exp())
+    };
+    let best = UNDECLARED_PLAYS.map(with_play).into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let without = cost_of(found);
     let samples = samples_around(table, &jumps);
     let shown = best.filter(|(cost, _)| without - cost > MIN_COST_REDUCTION * cost / samples);
-    let (_, found) = shown.unwrap_or((without, plain));
-    Some(Response { play: declared.play, dead_band: declared.dead_band, ..found })
+    Some(Response { lag_s: shown.map_or(found.lag_s, |(_, lag_s)| lag_s), ..found })
 }
 
 /// Starts of the steps with a jump of P3.
@@ -414,39 +419,77 @@ fn estimate_response<Prediction: Fn(f64) -> f64>(
         return None;
     }
     let samples = samples_around(table, jumps);
-    let cost_of = |response: Response| sum_of_squares(table, values, jumps, predict(response));
-    let at_rate = |slew_per_s: f64| {
-        let with = |lag_s: f64| Response { slew_per_s, ..Response::lag(lag_s) };
-        best_lag(|lag_s| cost_of(with(lag_s))).map(|(lag_s, cost)| (cost, with(lag_s)))
+    let estimate = Estimate {
+        cost_of: |response| sum_of_squares(table, values, jumps, predict(response)),
+        size,
+        samples,
     };
-    let is_better = |cost: f64, than: f64, min_reduction: f64| than - cost > min_reduction * cost / samples;
-    let mut best = at_rate(f64::INFINITY)?;
-    let coarse = RATES.iter().filter_map(|rate| at_rate(rate * size));
-    let (coarse_cost, coarse) = coarse.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    if is_better(coarse_cost, best.0, MIN_COARSE_REDUCTION) {
+    let plain = estimate.at(f64::INFINITY, 0.0)?;
+    // A dead time before a lag looks like a limited rate, so that the order of the search matters.
+    let ways = [estimate.late(estimate.limited(plain)), estimate.limited(estimate.late(plain))];
+    ways.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, response)| response)
+}
+
+/// The search for a response: each form is accepted if it reduces the cost of the one before by more than chance.
+struct Estimate<C: Fn(Response) -> f64> {
+    cost_of: C,
+    /// Median size of the jumps.
+    size: f64,
+    samples: f64,
+}
+
+/// A response with its cost.
+type Costed = (f64, Response);
+
+impl<C: Fn(Response) -> f64> Estimate<C> {
+    fn is_better(&self, cost: f64, than: f64, min_reduction: f64) -> bool {
+        than - cost > min_reduction * cost / self.samples
+    }
+
+    /// The best lag with this rate and dead time.
+    fn at(&self, slew_per_s: f64, dead_time_s: f64) -> Option<Costed> {
+        let with = |lag_s: f64| Response { slew_per_s, dead_time_s, ..Response::lag(lag_s) };
+        best_lag(|lag_s| (self.cost_of)(with(lag_s))).map(|(lag_s, cost)| (cost, with(lag_s)))
+    }
+
+    /// The same with a limited rate, if there is one.
+    fn limited(&self, start: Costed) -> Costed {
+        let at_rate = |slew_per_s: f64| self.at(slew_per_s, start.1.dead_time_s);
+        let coarse = RATES.iter().filter_map(|rate| at_rate(rate * self.size));
+        let coarse = coarse.min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, Response { slew_per_s, .. })) =
+            coarse.filter(|(cost, _)| self.is_better(*cost, start.0, MIN_COARSE_REDUCTION))
+        else {
+            return start;
+        };
         let cost = |rate: f64| at_rate(rate).map_or(f64::INFINITY, |(cost, _)| cost);
-        let range = (coarse.slew_per_s / RATE_FACTOR, coarse.slew_per_s * RATE_FACTOR);
-        let limited = at_rate(minimise_globally(range, RATE_TOLERANCE, cost)?);
-        best = limited.filter(|(cost, _)| is_better(*cost, best.0, MIN_COST_REDUCTION)).unwrap_or(best);
+        let range = (slew_per_s / RATE_FACTOR, slew_per_s * RATE_FACTOR);
+        let found = minimise_globally(range, RATE_TOLERANCE, cost).and_then(at_rate);
+        found.filter(|(cost, _)| self.is_better(*cost, start.0, MIN_COST_REDUCTION)).unwrap_or(start)
     }
-    // A dead time changes the lag that fits best.
-    let (without, start) = best;
-    let with_dead_time = |dead_time_s: f64| {
-        let (low, high) = (start.lag_s / LAG_FACTOR, start.lag_s);
+
+    /// The best lag, at most that of `start`, with this dead time.
+    fn with_dead_time(&self, dead_time_s: f64, start: Response) -> Costed {
         let with = |ln_lag: f64| Response { lag_s: ln_lag.exp(), dead_time_s, ..start };
-        let found = minimise(low.ln(), high.ln(), DEAD_TIME_TOLERANCE, |ln_lag| cost_of(with(ln_lag)));
+        let (low, high) = (start.lag_s / LAG_FACTOR, start.lag_s);
+        let found = minimise(low.ln(), high.ln(), DEAD_TIME_TOLERANCE, |ln_lag| (self.cost_of)(with(ln_lag)));
         (found.value, with(found.at))
-    };
-    let coarse = DEAD_TIMES_S.map(with_dead_time).into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-    let (_, Response { dead_time_s, .. }) =
-        coarse.filter(|(cost, _)| is_better(*cost, without, MIN_COARSE_REDUCTION)).unwrap_or(best);
-    if dead_time_s > 0.0 {
-        let (low, high) = (dead_time_s / DEAD_TIME_FACTOR, dead_time_s * DEAD_TIME_FACTOR);
-        let found = minimise(low, high, DEAD_TIME_TOLERANCE, |dead_time_s| with_dead_time(dead_time_s).0);
-        let late = with_dead_time(found.at);
-        best = if is_better(late.0, without, MIN_COST_REDUCTION) { late } else { best };
     }
-    Some(best.1)
+
+    /// The same with a dead time, if there is one.
+    fn late(&self, start: Costed) -> Costed {
+        let at_time = |dead_time_s: f64| self.with_dead_time(dead_time_s, start.1);
+        let coarse = DEAD_TIMES_S.map(at_time).into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, Response { dead_time_s, .. })) =
+            coarse.filter(|(cost, _)| self.is_better(*cost, start.0, MIN_COARSE_REDUCTION))
+        else {
+            return start;
+        };
+        let (low, high) = (dead_time_s / DEAD_TIME_FACTOR, dead_time_s * DEAD_TIME_FACTOR);
+        let found = minimise(low, high, DEAD_TIME_TOLERANCE, |dead_time_s| at_time(dead_time_s).0);
+        let late = at_time(found.at);
+        if self.is_better(late.0, start.0, MIN_COST_REDUCTION) { late } else { start }
+    }
 }
 
 #[cfg(test)]

@@ -311,16 +311,20 @@ fn describe_swapped_sensors(evidence: &Swapped) -> Sentence {
 }
 
 fn contradiction(faults: &[SuspectedFault]) -> Sentence {
-    let start =
-        sentence!("conditions, valve, head, heat of the housing and efficiencies do not agree unless ");
-    let with_faults = faults.iter().enumerate().fold(start, |text, (index, fault)| {
-        let joint = if index == 0 { "" } else { ", and " };
-        text.then(joint.to_owned().into()).then(describe_suspected_fault(fault))
-    });
-    with_faults.then(match faults.iter().any(|fault| fault.touches_points) {
-        true => sentence!(": compare the channels at standstill (`zero`) and with the barometer, and repair the sensor, declare its \
-             uncertainty or correct the declared conditions (`boundary`)"),
-        false => sentence!("; no point depends on it"),
+    let faults_found =
+        faults.iter().enumerate().fold(Sentence::from(String::new()), |text, (index, fault)| {
+            let joint = if index == 0 { "" } else { ", and " };
+            text.then(joint.to_owned().into()).then(describe_suspected_fault(fault))
+        });
+    let evidence = sentence!(
+        ": without this, conditions, valve, head, heat of the housing and efficiencies contradict each other; "
+    );
+    faults_found.then(evidence).then(match faults.iter().any(|fault| fault.touches_points) {
+        true => sentence!(
+            "compare the channels at standstill (`zero`) and with the barometer, and repair the sensor, declare its uncertainty or correct the \
+             declared conditions (`boundary`)"
+        ),
+        false => sentence!("no point depends on it"),
     })
 }
 

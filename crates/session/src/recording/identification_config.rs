@@ -44,6 +44,7 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         turbine_gas: campaign.machine.params.turbine.gas,
         humidity_sigma_kg_kg: campaign.report.humidity_sigma_kg_kg(&campaign.boundary),
         reference: campaign.reference,
+        valve_play_ratio: campaign.rig_actuators().valve_play_ratio,
         barometer_pa: campaign.report.barometer_pa,
         housing_contact_sigma_ratio: campaign
             .sensors

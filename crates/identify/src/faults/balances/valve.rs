@@ -6,7 +6,9 @@
 use crate::faults::balance_rows::{Machine, Rows, common, errors, own};
 use crate::faults::end_readings::{PerChannel, Readings};
 use crate::faults::nominal_rig::NominalRig;
+use mapper_core::StepMarker;
 use mapper_numerics::statistics::EXCLUDE_SIGMAS;
+use mapper_observe::model_inputs::lagged_command::SAFE_OPENING;
 use mapper_observe::perturbation::UNINFORMATIVE;
 use mapper_physics::laws::orifice;
 use nalgebra::DMatrix;
@@ -24,23 +26,46 @@ const DISCHARGE_LENGTH: f64 = 0.5;
 /// Repeatability of a valve's area, one standard deviation. Bound: a positioner resolves some tenths of a per cent of the travel.
 const VALVE_REPEATABILITY: f64 = 0.005;
 
+/// Where a valve stands in a step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Opening {
+    /// Its opening, with the declared play.
+    pub(crate) position: f64,
+    /// 1 if it came by opening, -1 if by closing: play leaves it behind.
+    pub(crate) side: f64,
+}
+
+/// From which side the valve came to each step: 1 by opening, -1 by closing.
+pub(crate) fn sides(steps: &[StepMarker]) -> Vec<f64> {
+    let (mut before, mut side) = (SAFE_OPENING, 0.0);
+    let side_of = |step: &StepMarker| {
+        let moved = step.valve_opening_ratio - before;
+        if moved.abs() > SAME_OPENING {
+            (before, side) = (step.valve_opening_ratio, moved.signum());
+        }
+        side
+    };
+    steps.iter().map(side_of).collect()
+}
+
 pub(crate) fn rows(
-    steps: &[(f64, Readings)],
+    steps: &[(Opening, Readings)],
     noise: &PerChannel,
     nominal: Option<&NominalRig<'_>>,
 ) -> Option<Rows> {
-    let known = |step: &&(f64, Readings)| {
+    let known = |step: &&(Opening, Readings)| {
         let (opening, readings) = step;
-        *opening > 0.0
+        opening.position > 0.0
             && readings.p2_pa() - readings.p1_pa() > EXCLUDE_SIGMAS * BACK_PRESSURE_SIGMA_PA
             && ln_area(readings).is_finite()
     };
-    let known: Vec<&(f64, Readings)> = steps.iter().filter(known).collect();
+    let known: Vec<&(Opening, Readings)> = steps.iter().filter(known).collect();
     let count = known.len();
     if count == 0 {
         return None;
     }
-    let openings: Vec<f64> = known.iter().map(|(opening, _)| *opening).collect();
+    let openings: Vec<f64> = known.iter().map(|(opening, _)| opening.position).collect();
+    let by_play = known.iter().map(|(opening, _)| -0.5 * opening.side / opening.position).collect();
     let readings: Vec<Readings> = known.iter().map(|(_, readings)| *readings).collect();
     let by_reading: Vec<PerChannel> = readings.iter().map(|readings| readings.derivatives(ln_area)).collect();
     let behind: Vec<f64> = by_reading.iter().map(|by| by[3]).collect();
@@ -50,7 +75,7 @@ pub(crate) fn rows(
     });
     let mut covariance = own(errors(&by_reading, noise, VALVE_REPEATABILITY).into_iter())
         + common(&behind, BACK_PRESSURE_SIGMA_PA);
-    let mut by_machine = Vec::new();
+    let mut by_machine = vec![(Machine::ValvePlay, by_play)];
     let expected: Vec<f64> = match nominal {
         Some(nominal) => {
             let outlet = &nominal.model.params.outlet;

@@ -2,6 +2,5 @@
 
 pub(crate) mod as_measured;
 pub(crate) mod budget;
-pub(crate) mod common_part;
 pub(crate) mod numbers;
 pub(crate) mod quantity;

@@ -10,8 +10,7 @@ use crate::joint::step_model::parameters::{
 };
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::uncertainty::budget;
-use crate::joint::uncertainty::common_part::common_part;
-use crate::joint::uncertainty::quantity::{Number, Quantity};
+use crate::joint::uncertainty::quantity::{Number, Quantity, common_part};
 use mapper_core::{BudgetRow, EstimateUncertainty, confidence_interval_95};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::median;

@@ -99,9 +99,12 @@ fn recorded(
             held_pa
         })
         .collect();
-    let rows = lagged.iter().map(|p3_pa| BoundaryConditions { p3_pa: *p3_pa, ..boundary() }).collect();
+    // The valve came to its opening by closing.
+    let valve_opening_ratio = boundary().valve_opening_ratio + 0.5 * rig.instruments.valve.play_ratio;
+    let with_play = BoundaryConditions { valve_opening_ratio, ..boundary() };
+    let rows = lagged.iter().map(|p3_pa| BoundaryConditions { p3_pa: *p3_pa, ..with_play }).collect();
     let inputs = InterpolatedInputs::new(fine_s, rows).unwrap();
-    let at_rest = BoundaryConditions { p3_pa: p3_pa[0], ..boundary() };
+    let at_rest = BoundaryConditions { p3_pa: p3_pa[0], ..with_play };
     let guess = hold_speed(&nominal, speeds_rpm[0], &boundary()).unwrap().state;
     let start = mapper_physics::simulation::driven::settle(&rig.model, &at_rest, guess).unwrap();
     let mut random = Pcg64::seed_from_u64(seed);

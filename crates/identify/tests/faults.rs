@@ -122,19 +122,20 @@ fn another_valve_is_named_and_leaves_the_points_as_they_are() {
 fn a_valve_with_play_is_named_and_leaves_the_points_as_they_are() {
     const PLAY: f64 = 0.05;
     for seed in [9002, 9003] {
-        let mut drawn = drawn(seed);
+        // Without a declared valve, every command has an area of its own.
+        let mut drawn = Drawn { is_declared: true, ..drawn(seed) };
         let good = |identified: &Identified| {
             identified.points.iter().flatten().filter(|point| point.verdict == Verdict::Good).count()
         };
         let good_as_commanded = good(&found(&drawn, &drawn.recording));
         // The recorded flow is that of the true opening, so the commands are what is put ahead of it.
-        let mut before = 1.0;
+        let (mut before, mut side) = (1.0, 0.0);
         for step in &mut drawn.recording.steps {
             let moved: f64 = step.valve_opening_ratio - before;
-            before = step.valve_opening_ratio;
             if moved != 0.0 {
-                step.valve_opening_ratio += 0.5 * PLAY * moved.signum();
+                (before, side) = (step.valve_opening_ratio, moved.signum());
             }
+            step.valve_opening_ratio += 0.5 * PLAY * side;
         }
         let with_play = found(&drawn, &drawn.recording);
         let [fault] = with_play.faults.as_slice() else { panic!("{:?}", with_play.faults) };

@@ -1,6 +1,6 @@
 //! The check of the gap diagnosis on withheld data: draws cases on the virtual lab, seals their causes, scores diagnoses.
 //!
-//! [`make`] writes recordings and sealed answers, [`score`](scoring::score::score) opens them. The diagnosis itself runs separately and
+//! [`make`] writes recordings and sealed answers, [`score`](score::score) opens them. The diagnosis itself runs separately and
 //! gets only the recordings. The causes reserved as "outside" are defined here and are not part of the catalogue.
 
 pub mod calibration;

@@ -241,10 +241,12 @@ impl Study {
         let start_s = reads.first().map_or(first_s, |(t_s, _)| *t_s) - 0.5;
         let end_s = reads.last().map_or(start_s + 1.0, |(t_s, _)| t_s + AFTER_LAST_S);
         let jumps = times.starts_s.iter().zip(&steps).filter(|(_, step)| step.jumped);
-        let mut jumps_s: Vec<f64> = jumps
-            .flat_map(|(start_s, step)| [*start_s, ramp_end_s(recording, &step.marker).max(*start_s)])
+        let jumps_s: Vec<f64> = jumps
+            .flat_map(|(start_s, step)| {
+                let end_s = step.ramped.then(|| ramp_end_s(recording, &step.marker).max(*start_s));
+                std::iter::once(*start_s).chain(end_s)
+            })
             .collect();
-        jumps_s.dedup();
         let (times_s, places): (Vec<f64>, Vec<_>) = reads.into_iter().unzip();
         Study {
             nuisances: nuisances(&declared),

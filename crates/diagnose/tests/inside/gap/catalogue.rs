@@ -91,6 +91,11 @@ fn complaint(clean: &Study, nominal: &Linearised, index: usize, effect: &dyn Eff
     }
     let name = |effect: usize| study.effects[effect].info().id.to_string();
     let mut more = additions(&study, nominal, &everywhere, &own, false);
+    // What does not show in these visits has rounding for a signature.
+    more.retain(|addition| {
+        let id = name(addition.effect);
+        id != TOO_SLOW && !WITHOUT_PLACE.contains(&id.as_str())
+    });
     more.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     if more[0].gain > CHANCE {
         return Some(format!("{} reduces it by {:.1} in addition", name(more[0].effect), more[0].gain));

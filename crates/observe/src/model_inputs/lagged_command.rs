@@ -60,7 +60,8 @@ impl Response {
 
     /// Position of the output, which was at `before`, behind a drive.
     fn output(&self, before: f64, drive: f64) -> f64 {
-        before.clamp(drive - 0.5 * self.play, drive + 0.5 * self.play)
+        let half = 0.5 * self.play;
+        drive + (before - drive).clamp(-half, half)
     }
 
     /// Position `elapsed_s` after the start of a movement from `from` to `to`.
@@ -257,14 +258,14 @@ pub fn ramp_end_s(recording: &Recording, step: &StepMarker) -> f64 {
 const COARSE_STEPS: usize = 24;
 /// Rates of the coarse search, in median jumps per second. Bound: slower rates are no jumps, faster ones a lag alone.
 const RATES: [f64; 9] = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 9.0, 16.0];
-/// Undeclared play of a valve beside which its lag is sought, opening. Bound: 1 % moves an output by less than noise, and a drive with more than 10 %
-/// is broken.
+/// Undeclared play with which the lag of a valve is sought again, opening. Bound: 1 % moves an output by less than noise, and a drive with more
+/// than 10 % is broken.
 const UNDECLARED_PLAYS: [f64; 4] = [0.01, 0.025, 0.05, 0.1];
 /// Dead times of the coarse search, s. Bound: below half a sample interval no recording shows one; slow air begins to move within seconds.
 const DEAD_TIMES_S: [f64; 6] = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0];
 /// Factor of the fine search about the best of them. Bound: the distance of two.
 const DEAD_TIME_FACTOR: f64 = 2.0;
-/// Tolerance of a dead time, s, and of the logarithm of the lag beside it. Bound: a tenth of a sample interval.
+/// Tolerance of a dead time, s, and of the logarithm of the lag that is sought with it. Bound: a tenth of a sample interval.
 const DEAD_TIME_TOLERANCE: f64 = 3e-3;
 /// Factor by which a dead time may shorten the lag that stood for both. Bound: a lag far below the dead time does not show.
 const LAG_FACTOR: f64 = 20.0;
@@ -288,13 +289,13 @@ pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f
     })
 }
 
-/// Response of the valve to its command, from flow and pressures: orifice flow is proportional to its area. `outlet`: the usual P1, Pa, and the volume
-/// before the valve, m3, which takes a part of the flow while P2 changes; 0 if it is unknown. `None` without jumps of the valve, flow, P2 or T2. A lag of the flow meter counts as one of the valve. `declared`: its motion, of
-/// which play and dead band are kept.
+/// Response of the valve to its command, from flow and pressures: orifice flow is proportional to its area, and the volume before it takes a part
+/// of the flow while P2 changes (`outlet_volume_m3`; 0 if it is unknown). `None` without jumps of the valve, flow, P2 or T2. A lag of the flow
+/// meter counts as one of the valve. Play and dead band are those `declared`.
 pub fn measured_valve_response(
     table: &Table,
     recording: &Recording,
-    outlet: (f64, f64),
+    (nominal_p1_pa, outlet_volume_m3): (f64, f64),
     declared: Response,
 ) -> Option<Response> {
     let flow = table.column(Channel::CompressorFlow)?;
@@ -307,8 +308,8 @@ pub fn measured_valve_response(
     };
     let openings: Vec<f64> = (0..table.t_s.len())
         .map(|i| {
-            let p1_pa = p1.map_or(outlet.0, |p1| p1[i]);
-            let filling_kg_s = outlet.1 * p2_slope_pa_s(i) / (Gas::AIR_GAS_CONSTANT_J_KGK * t2[i]);
+            let p1_pa = p1.map_or(nominal_p1_pa, |p1| p1[i]);
+            let filling_kg_s = outlet_volume_m3 * p2_slope_pa_s(i) / (Gas::AIR_GAS_CONSTANT_J_KGK * t2[i]);
             (flow[i] - filling_kg_s) / orifice::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(MIN_FLUX)
         })
         .collect();

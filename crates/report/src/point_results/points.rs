@@ -5,7 +5,7 @@ use crate::document::{Cell, Document, Table, verdict_word};
 use crate::formatting::{Display, number, percent};
 use Column as C;
 use mapper_core::{
-    Channel, CompressorMap, IdentifiedPoint, Recording, SpeedLine, StepKind, StepMarker, Verdict,
+    Channel, CompressorMap, IdentifiedPoint, Recording, SpeedLine, StepKind, StepMarker, Verdict, Warning,
     half_width_95, step_number,
 };
 use mapper_identify::DynamicEfficiency;
@@ -304,12 +304,17 @@ pub(crate) fn verdict_sentence<'a>(points: impl Iterator<Item = &'a IdentifiedPo
     }
 }
 
-/// The median share of the efficiencies that may be something else, in a sentence; `None` without one.
+/// Which efficiency it is, and the median share of it that may be something else, in a sentence; `None` without an efficiency.
 pub(crate) fn allowance_sentence<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Option<String> {
-    let middle = median(points.filter_map(|point| point.eta_allowance)).filter(|half| *half > 0.0)?;
+    let points: Vec<&IdentifiedPoint> = points.filter(|point| point.eta_allowance.is_some()).collect();
+    let middle = median(points.iter().filter_map(|point| point.eta_allowance)).filter(|half| *half > 0.0)?;
+    let which = if points.iter().all(|point| point.warnings.contains(&Warning::Apparent)) {
+        "The efficiency is the apparent one: heat exchanged with the housing counts as work, and no interval contains it"
+    } else {
+        "The efficiency is the wheel's as the method defines it"
+    };
     Some(format!(
-        "The efficiency is the wheel's as the method defines it; +/- {} points of it, which no interval contains, may be recirculation, recovery of \
-         the T2 probe or heat behind the wheel.",
+        "{which}; +/- {} points of it, which no interval contains, may be recirculation, recovery of the T2 probe or heat behind the wheel.",
         percent(Some(middle), 1)
     ))
 }

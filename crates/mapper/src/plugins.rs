@@ -35,14 +35,13 @@ pub fn plugins() -> Registry {
 }
 
 /// A suspected effect, written in rhai.
-fn read_effect(path: &Path) -> Result<Arc<dyn Effect>, SessionError> {
+fn read_effect(path: &Path) -> Result<Arc<dyn Effect>, Box<dyn std::error::Error + Send + Sync>> {
     let text = mapper_campaign::read_text(path).map_err(|source| SessionError::File {
         action: "read",
         path: path.to_owned(),
         source,
     })?;
-    let effect = ScriptEffect::new(&text, path).map_err(|error| SessionError::Effect(Box::new(error)))?;
-    Ok(Arc::new(effect))
+    Ok(Arc::new(ScriptEffect::new(&text, path)?))
 }
 
 /// Locations of drivers: first those that listen at a socket, then those next to this program, then those on `PATH`.

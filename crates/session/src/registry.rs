@@ -7,16 +7,13 @@ use mapper_campaign::campaign::BackendChoice;
 use mapper_core::{
     Backend, BackendError, Channel, DeclaredUncertainty, MapFormats, Sentences, SetpointRanges,
 };
-use mapper_physics::rig::backend_plugin::{BackendPlugin, NominalRig};
+use mapper_physics::rig::backend_plugin::{BackendPlugin, NominalRig, ReadEffect};
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
 use mapper_recording::ChannelMap;
 use mapper_recording::logs::LogFormats;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Reads a suspected effect from a file.
-pub type ReadEffect = fn(&Path) -> Result<Arc<dyn Effect>, SessionError>;
 
 /// Creates a driver, a backend that is not a plug-in, from its name and settings.
 pub type MakeDriver =
@@ -70,7 +67,7 @@ impl Registry {
     /// Setpoint ranges of a campaign's rig, if they are known without starting a driver.
     pub(crate) fn setpoint_ranges(&self, campaign: &Campaign, model: &Model) -> Option<SetpointRanges> {
         let BackendChoice { name, settings, .. } = &campaign.backend;
-        let nominal = nominal_rig(campaign, model, &self.effects);
+        let nominal = nominal_rig(campaign, model, self);
         BackendPlugin::make_by_name(&self.backends, name, &nominal, settings).ok()?.describe().accepts
     }
 
@@ -86,7 +83,7 @@ impl Registry {
         {
             return driver(&wanted.name, &wanted.settings);
         }
-        let nominal = nominal_rig(campaign, model, &self.effects);
+        let nominal = nominal_rig(campaign, model, self);
         BackendPlugin::make_by_name(&self.backends, &wanted.name, &nominal, &wanted.settings)
     }
 
@@ -97,7 +94,8 @@ impl Registry {
     pub fn effects_with(&self, scripts: &[PathBuf]) -> Result<Vec<Arc<dyn Effect>>, SessionError> {
         let mut effects = self.effects.clone();
         for path in scripts {
-            let scripted = (self.read_effect)(path)?;
+            let scripted = (self.read_effect)(path)
+                .map_err(|error| error.downcast().map_or_else(SessionError::Effect, |known| *known))?;
             let id = &scripted.info().id;
             if effects.iter().any(|effect| effect.info().id == *id) {
                 return Err(SessionError::DuplicateEffect { path: path.clone(), id: id.to_string() });
@@ -108,12 +106,12 @@ impl Registry {
     }
 }
 
-fn no_effect(path: &Path) -> Result<Arc<dyn Effect>, SessionError> {
-    Err(SessionError::EffectFilesUnsupported(path.to_owned()))
+fn no_effect(path: &Path) -> Result<Arc<dyn Effect>, Box<dyn std::error::Error + Send + Sync>> {
+    Err(Box::new(SessionError::EffectFilesUnsupported(path.to_owned())))
 }
 
 /// Nominal machine and rig data for a backend.
-fn nominal_rig(campaign: &Campaign, model: &Model, effects: &[Arc<dyn Effect>]) -> NominalRig {
+fn nominal_rig(campaign: &Campaign, model: &Model, registry: &Registry) -> NominalRig {
     let sensors = || campaign.sensors.iter();
     // The errors that identification assumes are drawn too.
     let declared = declared(campaign, &ChannelMap::native());
@@ -140,7 +138,8 @@ fn nominal_rig(campaign: &Campaign, model: &Model, effects: &[Arc<dyn Effect>]) 
         sensors: declared,
         tolerances: campaign.tolerances,
         soak: campaign.zero,
-        effects: effects.to_vec(),
+        effects: registry.effects.clone(),
+        read_effect: registry.read_effect,
         seed: campaign.seed,
     }
 }

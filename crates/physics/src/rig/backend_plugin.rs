@@ -8,7 +8,12 @@ use mapper_core::{
     Soak,
 };
 use std::collections::BTreeMap;
+use std::error::Error;
+use std::path::Path;
 use std::sync::Arc;
+
+/// Reads a suspected effect from a file.
+pub type ReadEffect = fn(&Path) -> Result<Arc<dyn Effect>, Box<dyn Error + Send + Sync>>;
 
 /// Makes a backend from the declared rig and from its own settings, the value below `backend: {NAME: ...}` of a
 /// campaign; `null` if the campaign gives none.
@@ -80,6 +85,8 @@ pub struct NominalRig {
     pub soak: Option<Soak>,
     /// Effects that may be added to a simulated machine by their ids.
     pub effects: Vec<Arc<dyn Effect>>,
+    /// Reads further effects that a backend's settings name by their files.
+    pub read_effect: ReadEffect,
     /// Seed of all noise and of all random draws.
     pub seed: u64,
 }

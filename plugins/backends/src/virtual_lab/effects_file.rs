@@ -9,6 +9,7 @@ use mapper_physics::rig::effect::{self, Effect, EffectParameter, Rig};
 use mapper_yaml::units::{Duration, Kind, Length, Quantity};
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 /// A single value, or several values by name.
@@ -28,20 +29,15 @@ pub(crate) enum ValueText {
     Text(String),
 }
 
-/// Applies the effects to a rig.
+/// Applies the effects to a rig: those of the library by their ids, others by their files.
 pub(crate) fn apply_effects(
     rig: &mut Rig,
     requested: &BTreeMap<String, EffectValues>,
-    known: &[Arc<dyn Effect>],
+    nominal: &NominalRig,
 ) -> Result<(), BackendError> {
     for (id, values) in requested {
         let key = format!("effects.{id}");
-        let Some(effect) = known.iter().find(|effect| effect.info().id == id.as_str()) else {
-            let ids: Vec<&str> = known.iter().map(|effect| effect.info().id.as_ref()).collect();
-            let guess = mapper_yaml::closest(id, &ids).map(|guess| format!(" Did you mean `{guess}`?"));
-            let (guess, known) = (guess.unwrap_or_default(), ids.join(", "));
-            return Err(SettingProblem::UnknownEffect { guess, known }.at(key));
-        };
+        let effect = find_effect(id, nominal).map_err(|problem| problem.at(key.as_str()))?;
         let parameters = &effect.info().parameters;
         if let Some(name) = values.unknown_name(parameters) {
             return Err(form_problem(parameters).at(format!("{key}.{name}")));
@@ -51,6 +47,18 @@ pub(crate) fn apply_effects(
             .map_err(|problem| problem.at(key))?;
     }
     Ok(())
+}
+
+fn find_effect(id: &str, nominal: &NominalRig) -> Result<Arc<dyn Effect>, SettingProblem> {
+    if id.ends_with(".rhai") {
+        return (nominal.read_effect)(Path::new(id)).map_err(SettingProblem::EffectFile);
+    }
+    let known = &nominal.effects;
+    known.iter().find(|effect| effect.info().id == id).cloned().ok_or_else(|| {
+        let ids: Vec<&str> = known.iter().map(|effect| effect.info().id.as_ref()).collect();
+        let guess = mapper_yaml::closest(id, &ids).map(|guess| format!(" Did you mean `{guess}`?"));
+        SettingProblem::UnknownEffect { guess: guess.unwrap_or_default(), known: ids.join(", ") }
+    })
 }
 
 impl EffectValues {

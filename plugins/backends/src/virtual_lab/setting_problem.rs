@@ -28,8 +28,10 @@ pub enum SettingProblem {
     #[error("{value} has no unit: write `{value} {unit}`")]
     BareNumber { value: f64, unit: String },
     /// `guess`: the effect that was probably meant, as a question after a blank, or empty.
-    #[error("unknown effect.{guess} The effects are {known}")]
+    #[error("unknown effect.{guess} The effects are {known}, or the path of a file in rhai")]
     UnknownEffect { guess: String, known: String },
+    #[error(transparent)]
+    EffectFile(Box<dyn std::error::Error + Send + Sync>),
     #[error("write {form}")]
     EffectForm { form: String },
     #[error(transparent)]

@@ -219,7 +219,7 @@ pub fn read_settings(
         draw_tolerances(&mut rig, &nominal.tolerances, file.tolerances_seed.unwrap_or(nominal.seed));
     }
     file.deviations.apply(&mut rig)?;
-    apply_effects(&mut rig, &file.effects, &nominal.effects)?;
+    apply_effects(&mut rig, &file.effects, nominal)?;
     let (actuators, declared) = (&file.actuators, &nominal.actuators);
     let draws = Draws {
         seed: nominal.seed,
@@ -396,6 +396,7 @@ mod tests {
     use super::*;
     use mapper_core::{DeclaredUncertainty, ModelTolerances, RigActuators};
     use mapper_physics::machine::params::BoundaryConditions;
+    use mapper_physics::simulation::model::{State, rad_s_of_rpm};
     use serde_json::json;
 
     fn nominal() -> NominalRig {
@@ -411,6 +412,10 @@ mod tests {
             soak: None,
             tolerances: ModelTolerances::default(),
             effects: mapper_effects::catalogue(),
+            read_effect: |path| {
+                let script = std::fs::read_to_string(path)?;
+                Ok(std::sync::Arc::new(mapper_effects::ScriptEffect::new(&script, path)?))
+            },
             seed: 5,
         }
     }
@@ -433,6 +438,21 @@ mod tests {
         assert_eq!(lab.instruments.path(Channel::T2).offset, -1.0);
         assert!((lab.p3_actuator.lag_s - 1.1).abs() < 1e-12);
         assert!(!lab.weather.is_calm());
+    }
+
+    /// 1.5e-6 (110e3 pi/30)^2 = 199.04 W leave the shaft.
+    #[test]
+    fn an_effect_in_rhai_is_named_by_its_file() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/effects/bearing_friction.rhai");
+        let lab =
+            read_settings(&json!({"effects": {file: {"c": "1.5e-6 W s2/rad2"}}}), &nominal()).unwrap();
+        let state = State::new(rad_s_of_rpm(110e3), 155e3, 340.0, 500.0, 370.0);
+        let balance_w = |model: &Model| {
+            let model = model.prepare(&BoundaryConditions { p3_pa: 165e3, ..BoundaryConditions::default() });
+            model.shaft_balance_w(&model.evaluate(&state))
+        };
+        let (without_w, with_w) = (balance_w(&nominal().model), balance_w(&lab.model));
+        assert!((without_w - with_w - 199.04).abs() < 0.01, "{without_w} {with_w}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::faults::nominal_rig::NominalRig;
 use crate::joint::DynamicEfficiency;
 use crate::needs::missing;
 use crate::points::points_with_budgets;
+use crate::single_step::dynamic::FittedReadings;
 use crate::step_data::humidity::with_measured_humidity;
 use crate::{IdentifyConfig, IdentifyError, StepError};
 use mapper_core::{IdentifiedPoint, PointBudgets, Recording, ThermalModel};
@@ -54,6 +55,8 @@ pub struct Identified {
     pub detectable: Vec<(Suspect, f64)>,
     /// Uncertainty budgets of the points, in order.
     pub budgets: Vec<PointBudgets>,
+    /// Each step, by its index, with the readings that the fit predicts.
+    pub fitted: Vec<(usize, Vec<FittedReadings>)>,
 }
 
 /// Like [`identify_each`], with the shared parameters of the points (joint method alone). Compared with a declared rig, if one is given: points
@@ -79,5 +82,7 @@ pub fn identify_recording(
     let estimated = Estimated::of(evidence, recording, config, nominal.as_ref());
     let Estimated { steps, estimates, thermal, dynamic, faults, detectable } = estimated;
     let (points, budgets) = points_with_budgets(recording, steps, &estimates, config);
-    Ok(Identified { points, thermal, dynamic, faults, detectable, budgets })
+    let fits = estimates.into_iter().map(|estimate| estimate.fitted);
+    let fitted = recording.steps.iter().map(|step| step.index).zip(fits).collect();
+    Ok(Identified { points, thermal, dynamic, faults, detectable, budgets, fitted })
 }

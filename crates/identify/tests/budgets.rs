@@ -9,7 +9,7 @@ use mapper_core::{
 };
 use mapper_identify::{Choice, Identified, IdentifyConfig, JointSettings, identify_recording};
 use mapper_numerics::parallel;
-use mapper_numerics::statistics::mean;
+use mapper_numerics::statistics::{mean, rms};
 use mapper_physics::gas::air::Air;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -57,6 +57,23 @@ fn fixed() -> JointSettings {
 
 fn contribution(budget: &UncertaintyBudget, source: &str) -> f64 {
     budget.rows.iter().find(|row| row.source == source).map_or(0.0, |row| row.contribution)
+}
+
+/// Means over half a second have less noise than samples; what a fit leaves beyond it is the noise of the smoothed inputs.
+#[test]
+fn the_fit_of_each_point_leaves_no_more_than_the_noise() {
+    let (recording, declared) = recorded();
+    let found = identified(&recording, &declared, JointSettings::default());
+    assert_eq!(found.fitted.len(), recording.steps.len());
+    for (step, fitted) in &found.fitted {
+        let channels: Vec<Channel> = fitted.iter().map(|one| one.channel).collect();
+        assert_eq!(channels, [Channel::T2, Channel::Tc], "{step}");
+        for one in fitted {
+            let left = one.read_k.iter().zip(&one.fitted_k).map(|(read, fitted)| read - fitted);
+            let (left_k, noise_k) = (rms(left).unwrap(), declared[&one.channel].noise_sigma);
+            assert!(left_k < 2.5 * noise_k, "{step} {:?}: {left_k} K of {noise_k} K", one.channel);
+        }
+    }
 }
 
 #[test]

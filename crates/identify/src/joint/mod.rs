@@ -21,7 +21,7 @@ use crate::joint::step_model::parameters::{INLET, LN_INNER_CONDUCTANCE, LOGIT_IN
 use crate::joint::step_model::rows::{Row, StepRows};
 use crate::joint::uncertainty::numbers::Numbers;
 use crate::joint::uncertainty::quantity::Number;
-use crate::single_step::dynamic::Estimate;
+use crate::single_step::dynamic::{Estimate, FittedReadings};
 use crate::step_data::end_state::EndState;
 use crate::step_outcome::findings::Findings;
 use crate::{Choice, IdentifyConfig, step_data::commands};
@@ -144,9 +144,21 @@ pub(crate) fn estimate(
         }
         let (first, last) = (step.rows.first(), step.rows.last());
         let change = |read: fn(&Row) -> f64| first.zip(last).map(|(first, last)| read(last) - read(first));
-        let rows = step.rows.len();
-        let readings = member.measured_k.iter().zip(&predictions[i].readings_k).take(rows);
-        let residual = readings.map(|(measured, found)| measured - found);
+        let t_s: Vec<f64> = step.rows.iter().map(|row| row.t_s).collect();
+        let rows = t_s.len().max(1);
+        let of_channels = member.measured_k.chunks(rows).zip(predictions[i].readings_k.chunks(rows));
+        let fitted: Vec<FittedReadings> = [Channel::T2, Channel::Tc]
+            .into_iter()
+            .zip(of_channels)
+            .map(|(channel, (read_k, fitted_k))| FittedReadings {
+                channel,
+                t_s: t_s.clone(),
+                read_k: read_k.to_vec(),
+                fitted_k: fitted_k.to_vec(),
+            })
+            .collect();
+        let residual =
+            fitted.first().map(|t2| t2.read_k.iter().zip(&t2.fitted_k).map(|(read, found)| read - found));
         let [eta_rows, ln_h_rows] = numbers.budgets[i].clone();
         let eta_rows = eta_rows.into_iter().map(|row| uncertainty::budget::in_unit(row, 1.0, "1")).collect();
         let h_rows =
@@ -164,7 +176,8 @@ pub(crate) fn estimate(
                 numbers.common[1][i].iter().map(|by_ln_h| h_w_m2k * by_ln_h).collect(),
             ],
             window: first.zip(last).map(|(first, last)| Window { start_s: first.t_s, end_s: last.t_s }),
-            residual_rms_k: rms(residual),
+            residual_rms_k: residual.and_then(rms),
+            fitted,
             dt2_k: change(|row| row.t2_k),
             dtc_k: change(|row| row.tc_k),
         };

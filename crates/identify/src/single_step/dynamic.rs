@@ -10,7 +10,8 @@ use crate::step_data::window;
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, step_data::commands, step_outcome::interval_width};
 use mapper_core::{
-    BudgetRow, EstimateUncertainty, FitFailure, NoCompression, PoorFit, Recording, TooFew, Warning, Window,
+    BudgetRow, Channel, EstimateUncertainty, FitFailure, NoCompression, PoorFit, Recording, TooFew, Warning,
+    Window,
 };
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::parallel;
@@ -31,6 +32,21 @@ pub(crate) struct Estimate {
     pub(crate) residual_rms_k: Option<f64>,
     pub(crate) dt2_k: Option<f64>,
     pub(crate) dtc_k: Option<f64>,
+    /// Readings that the method predicts; empty if it predicts none.
+    pub(crate) fitted: Vec<FittedReadings>,
+}
+
+/// Readings of a channel over the window of a step, and the same by the fit that gave the point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedReadings {
+    /// T2, or Tc by the heat balance of the housing.
+    pub channel: Channel,
+    /// Run time, s; means over blocks if the method condenses the samples.
+    pub t_s: Vec<f64>,
+    /// Measured, K.
+    pub read_k: Vec<f64>,
+    /// By the fit, K.
+    pub fitted_k: Vec<f64>,
 }
 
 /// Identifies each step that has an end state and adds findings; other steps get no result.
@@ -87,6 +103,9 @@ pub(crate) fn estimate(
         return estimate;
     };
     estimate.residual_rms_k = Some(fit.residual_rms_k());
+    let read_k: Vec<f64> = samples.rows.iter().map(|row| row.t2_k).collect();
+    let fitted_k = read_k.iter().zip(&fit.residual_k).map(|(read, residual)| read - residual).collect();
+    estimate.fitted = vec![FittedReadings { channel: Channel::T2, t_s: samples.times_s(), read_k, fitted_k }];
     if let Some(bound) = fit.at_bound() {
         findings.refuse(Warning::AtBound(bound));
         return estimate;

@@ -9,4 +9,3 @@ pub(crate) mod fit;
 pub(crate) mod flow_drift;
 pub(crate) mod probe;
 pub(crate) mod steady;
-pub(crate) mod t2_history;

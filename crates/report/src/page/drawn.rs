@@ -9,7 +9,7 @@ use mapper_chart::MapDrawing;
 use mapper_core::{
     Channel, CompressorMap, IdentifiedPoint, Recording, StepMarker, half_width_95, standard_error_of,
 };
-use mapper_identify::{DynamicEfficiency, T2History};
+use mapper_identify::{DynamicEfficiency, FittedReadings};
 use mapper_numerics::statistics::{mean, rms};
 use serde::Serialize;
 
@@ -259,7 +259,7 @@ pub(crate) struct DrawnStep {
     t: Vec<f64>,
     channels: Vec<DrawnChannel>,
     window: Option<[f64; 2]>,
-    model: Option<DrawnModel>,
+    fits: Vec<DrawnFit>,
 }
 
 #[derive(Serialize)]
@@ -269,14 +269,14 @@ struct DrawnChannel {
     values: Vec<Option<f64>>,
 }
 
-/// T2 by the point's numbers and its residual, in the unit of temperatures and in K.
+/// A channel by the fit that gave the point, in the unit of temperatures, and its residual.
 #[derive(Serialize)]
-struct DrawnModel {
+struct DrawnFit {
+    channel: &'static str,
     t: Vec<f64>,
-    t2: Vec<f64>,
+    fitted: Vec<f64>,
     left_k: Vec<f64>,
     rms_k: f64,
-    shift_k: f64,
 }
 
 /// All steps that a point was identified from.
@@ -285,12 +285,13 @@ pub(crate) fn drawn_steps(report: &RunReport<'_>, display: &Display) -> Vec<Draw
     markers
         .filter_map(|marker| {
             let point = report.results.identified().find(|point| point.step == marker.index)?;
-            let history = report.t2_histories.iter().find(|history| history.step == marker.index);
+            let fitted = report.fitted.iter().find(|(step, _)| *step == marker.index);
+            let fits = fitted.map_or(&[][..], |(_, fits)| fits);
             let window = point
                 .window
                 .map(|window| [window.start_s, window.end_s].map(|t_s| rounded(t_s - marker.start_s)));
-            let model = history.map(|history| drawn_model(history, marker, display));
-            Some(DrawnStep { window, model, ..drawn_step(report.recording, marker, display) })
+            let fits = fits.iter().map(|fit| drawn_fit(fit, marker, display)).collect();
+            Some(DrawnStep { window, fits, ..drawn_step(report.recording, marker, display) })
         })
         .collect()
 }
@@ -312,28 +313,24 @@ fn drawn_step(recording: &Recording, marker: &StepMarker, display: &Display) -> 
         t: (0..ROWS).map(|row| rounded(middle_s(row))).collect(),
         channels: channels.collect(),
         window: None,
-        model: None,
+        fits: Vec::new(),
     }
 }
 
-fn drawn_model(history: &T2History, marker: &StepMarker, display: &Display) -> DrawnModel {
-    let rows = history.t_s.len().min(ROWS);
-    let bin = |row: usize| row * history.t_s.len() / rows.max(1)..(row + 1) * history.t_s.len() / rows.max(1);
+fn drawn_fit(fit: &FittedReadings, marker: &StepMarker, display: &Display) -> DrawnFit {
+    let rows = fit.t_s.len().min(ROWS);
+    let bin = |row: usize| row * fit.t_s.len() / rows.max(1)..(row + 1) * fit.t_s.len() / rows.max(1);
     let column = |values: &[f64]| -> Vec<f64> {
         (0..rows).map(|row| values.get(bin(row)).and_then(finite_mean).unwrap_or(f64::NAN)).collect()
     };
-    let left_k: Vec<f64> =
-        history.read_k.iter().zip(&history.model_k).map(|(read, model)| read - model).collect();
-    let rms_k = rms(&left_k).unwrap_or(0.0);
-    DrawnModel {
-        t: column(&history.t_s).into_iter().map(|t_s| rounded(t_s - marker.start_s)).collect(),
-        t2: column(&history.model_k)
-            .into_iter()
-            .map(|k| rounded(display.number(Kind::Temperature, k)))
-            .collect(),
+    let left_k: Vec<f64> = fit.read_k.iter().zip(&fit.fitted_k).map(|(read, fitted)| read - fitted).collect();
+    let shown = |k| rounded(display.number(Kind::Temperature, k));
+    DrawnFit {
+        channel: fit.channel.symbol(),
+        t: column(&fit.t_s).into_iter().map(|t_s| rounded(t_s - marker.start_s)).collect(),
+        fitted: column(&fit.fitted_k).into_iter().map(shown).collect(),
         left_k: column(&left_k).into_iter().map(rounded).collect(),
-        rms_k: rounded(rms_k),
-        shift_k: rounded(history.shift_k),
+        rms_k: rounded(rms(&left_k).unwrap_or(0.0)),
     }
 }
 

@@ -22,7 +22,7 @@ use mapper_core::{
     StepKind, Verdict,
 };
 use mapper_diagnose::gap::{Diagnosed, PointCorrection};
-use mapper_identify::{T2History, ZeroOutcome};
+use mapper_identify::{FittedReadings, ZeroOutcome};
 use mapper_observe::energy_balance::Gases;
 use mapper_recording::score::summarise;
 use std::collections::BTreeMap;
@@ -65,8 +65,8 @@ pub struct RunReport<'a> {
     pub corrections: &'a [PointCorrection],
     /// Whether a picture of the map is next to the report as `map.svg`.
     pub has_picture: bool,
-    /// T2 computed from the numbers of each point.
-    pub t2_histories: &'a [T2History],
+    /// Each step, by its index, with the readings that the fit predicts.
+    pub fitted: &'a [(usize, Vec<FittedReadings>)],
     /// The diagnosis of the gap to the nominal model, if there is one.
     pub gap: Option<&'a Diagnosed>,
     /// Maps for comparison.

@@ -16,8 +16,9 @@ use mapper_core::{
 };
 use mapper_diagnose::gap::PointCorrection;
 use mapper_identify::{
-    CellReference, DynamicEfficiency, FoundFault, IdentifyConfig, IsothermalZero, NominalRig, PeriodicError,
-    ZeroOutcome, ZeroSettings, identify_recording, isothermal_zero, method_for, with_measured_humidity,
+    CellReference, DynamicEfficiency, FittedReadings, FoundFault, IdentifyConfig, IsothermalZero, NominalRig,
+    PeriodicError, ZeroOutcome, ZeroSettings, identify_recording, isothermal_zero, method_for,
+    with_measured_humidity,
 };
 use mapper_maps::{AssembleError, RepeatedJump, assemble, repeated_jumps};
 use mapper_observe::FusedChannel;
@@ -61,6 +62,9 @@ pub struct Identified {
     /// Uncertainty budgets of the points, in order.
     #[serde(skip)]
     pub budgets: Vec<PointBudgets>,
+    /// Each step, by its index, with the readings that the fit predicts.
+    #[serde(skip)]
+    pub fitted: Vec<(usize, Vec<FittedReadings>)>,
     /// Result of sensor fusion.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sensors: Vec<FusedChannel>,
@@ -286,6 +290,7 @@ impl Session<'_> {
             dynamic: identified.dynamic,
             faults: identified.faults,
             budgets: identified.budgets,
+            fitted: identified.fitted,
             sensors,
             zero,
             score,

@@ -14,7 +14,6 @@ use mapper_core::{
     CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, ResultRemark, RunEnding,
     ThermalModel, with_sentences,
 };
-use mapper_identify::{T2History, t2_history};
 use mapper_maps::{MapFit, MapFitOptions, RepeatedJump};
 use mapper_recording::{ChannelMap, ReadOptions, ReadWarning, read_recording};
 use mapper_report::{
@@ -249,8 +248,7 @@ impl Session<'_> {
         let repeats = identified.repeats();
         let (map, program) = (map.as_ref(), program_and_commit(self.registry.commit));
         let results = identified.shown(map, &repeats, &remarks);
-        let t2_histories = t2_histories(&identified);
-        let report = run_report(&origin, &identified, results, &program, &t2_histories);
+        let report = run_report(&origin, &identified, results, &program);
         Ok(RunReport { others: &others, gap: gap.map(|gap| &gap.diagnosed), ..report }.page()?)
     }
 
@@ -283,10 +281,8 @@ impl Session<'_> {
         }
         let (repeats, program) = (identified.repeats(), program_and_commit(self.registry.commit));
         let has_picture = map.contains_key("svg");
-        let t2_histories = t2_histories(&identified);
         let results = identified.shown(compressor_map.as_ref(), &repeats, &remarks);
-        let shown =
-            RunReport { has_picture, ..run_report(origin, &identified, results, &program, &t2_histories) };
+        let shown = RunReport { has_picture, ..run_report(origin, &identified, results, &program) };
         let report = files.write(run_directory::REPORT, shown.markdown().as_bytes());
         let page = files.write(run_directory::PAGE, shown.page()?.as_bytes());
         identified.remarks = remarks;
@@ -339,7 +335,6 @@ fn run_report<'a>(
     identified: &'a Identified,
     results: PointResults<'a>,
     program: &'a str,
-    t2_histories: &'a [T2History],
 ) -> RunReport<'a> {
     RunReport {
         machine: &origin.machine,
@@ -363,16 +358,10 @@ fn run_report<'a>(
         alpha_area_ratio: identified.config.alpha_area_ratio,
         events: &identified.recording.events,
         has_picture: false,
-        t2_histories,
+        fitted: &identified.fitted,
         gap: None,
         others: &[],
     }
-}
-
-/// T2 computed from the numbers of each point.
-fn t2_histories(identified: &Identified) -> Vec<T2History> {
-    let history = |point: &IdentifiedPoint| t2_history(&identified.recording, point, &identified.config);
-    identified.points_alone().filter_map(history).collect()
 }
 
 /// Source entry of a recording in a report.

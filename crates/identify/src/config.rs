@@ -10,6 +10,7 @@ use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
 use mapper_physics::gas::pressure_tap::static_to_total_pa;
 use mapper_physics::machine::params::{BearingParams, Params};
+use mapper_physics::rig::sensor_fault::Rest;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -77,8 +78,8 @@ pub struct IdentifyConfig {
     pub turbine_gas: Gas,
     /// One standard deviation of the humidity of `air`, kg/kg: part of the intervals of the joint method.
     pub humidity_sigma_kg_kg: f64,
-    /// Pressure at which an isothermal zero has compared the pressure sensors, Pa: their gain errors count from there; 0 without a zero.
-    pub rest_pressure_pa: f64,
+    /// Readings of an isothermal zero: gain errors count from there.
+    pub rest: Rest,
     /// Declared play of the back-pressure valve, opening.
     pub valve_play_ratio: f64,
     /// Error that all absolute pressures share, one standard deviation, Pa: of the barometer to which gauge pressures are added, and what an
@@ -127,7 +128,7 @@ impl Default for IdentifyConfig {
             air: Air::PAPER,
             turbine_gas: Gas::CLOSED_FORM_AIR,
             humidity_sigma_kg_kg: 0.0,
-            rest_pressure_pa: 0.0,
+            rest: Rest::default(),
             valve_play_ratio: 0.0,
             barometer_sigma_pa: 0.0,
             barometer_pa: None,

@@ -55,8 +55,7 @@ impl Estimated {
         if let (Some(fitted), Some(balances), true) =
             (&fitted, &balances, nominal.is_some() && faults.is_empty())
         {
-            let readings =
-                faults::all_readings(recording, &ends, config.rest_pressure_pa).unwrap_or_default();
+            let readings = faults::all_readings(recording, &ends, config.rest).unwrap_or_default();
             // Without a density of the balances nothing is known of faults.
             let _ = faults::possible::widen(&mut estimates, fitted, &readings, balances, config);
         }

@@ -10,7 +10,6 @@ use mapper_core::{
     Channel, CommonErrors, EstimateUncertainty, IdentifiedPoint, PointBudgets, Recording, StepMarker,
     confidence_interval_95,
 };
-use mapper_physics::rig::sensor_fault::gain_error;
 
 /// The points, and the budgets of those that there are.
 pub(crate) fn points_with_budgets(
@@ -92,9 +91,8 @@ pub(crate) fn point(
 fn common_errors(state: &EndState, estimate: &Estimate, config: &IdentifyConfig) -> CommonErrors {
     let relative = |channel: Channel, reading: f64| {
         let declared = config.sensor(channel);
-        let relative = (declared.offset_sigma / reading).hypot(
-            declared.gain_sigma_ratio * gain_error(channel, reading, config.rest_pressure_pa) / reading,
-        );
+        let relative = (declared.offset_sigma / reading)
+            .hypot(declared.gain_sigma_ratio * config.rest.gain_error(channel, reading) / reading);
         // A reading of 0 has no relative error and no position on a map.
         if relative.is_finite() { relative } else { 0.0 }
     };

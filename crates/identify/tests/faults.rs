@@ -9,7 +9,7 @@
 use crate::lab::{Machine as LabMachine, campaign, measured};
 use mapper_core::{Channel, FaultKind, Method, ModelTolerances, Recording, Verdict};
 use mapper_identify::{Identified, IdentifyConfig, Machine, NominalRig, Suspect, identify_recording};
-use mapper_physics::rig::sensor_fault::additive;
+use mapper_physics::rig::sensor_fault::{Rest, additive};
 use mapper_physics::simulation::model::Model;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -69,7 +69,7 @@ fn with(recording: &Recording, suspect: &Suspect, size: f64) -> Recording {
         for (t_s, value) in series.t_s.iter().zip(&mut series.values) {
             let share = (t_s - start_s) / (end_s - start_s);
             let housing_k = housing.interpolate(*t_s).unwrap();
-            *value += size * fault.error_per_unit(*channel, *value, housing_k, share, 0.0);
+            *value += size * fault.error_per_unit(*channel, *value, housing_k, share, Rest::default());
         }
     }
     doctored

@@ -71,6 +71,35 @@ fn a_soak_brings_low_speed_within_reach() {
     assert!((without / count).sqrt() > 0.012);
 }
 
+/// A thermocouple that reads 5 % towards a cell of 25 degC is right at rest, so that its error counts from there.
+#[test]
+fn a_loose_thermocouple_on_the_housing_stays_within_the_intervals_after_a_zero() {
+    let clean = campaign(&eighteen(), 120.0, Machine::default());
+    let mut soaked = with_soak(&clean.recording, 1800.0);
+    for tc_k in &mut soaked.series.get_mut(&Channel::Tc).unwrap().values {
+        *tc_k -= 0.05 * (*tc_k - 298.15);
+    }
+    let (mut held, mut count) = (0.0, 0.0);
+    for seed in 20..24 {
+        let (recording, declared) = measured(&soaked, 1.0, 1.0, &mut Pcg64::seed_from_u64(seed));
+        let config = IdentifyConfig {
+            method: Method::Joint,
+            declared,
+            housing_contact_sigma_ratio: 0.03,
+            ..IdentifyConfig::default()
+        };
+        let zero = isothermal_zero(&recording, &config, &ZeroSettings::default()).unwrap();
+        let (recording, config) = zeroed(recording, config, &zero);
+        for (point, truth) in identify(&recording, &config).unwrap().iter().zip(&clean.truth) {
+            let (low, high) = (point.eta_low.unwrap(), point.eta_high.unwrap());
+            held += f64::from(u8::from((low..=high).contains(&truth.eta)));
+            count += 1.0;
+        }
+    }
+    // The points of a recording share their errors: one recording of four may lie on one side.
+    assert!(held / count >= 0.75, "{held} of {count}");
+}
+
 #[test]
 fn what_is_no_soak_is_refused() {
     let clean = campaign(&eighteen()[..2], 120.0, Machine::default());

@@ -4,6 +4,7 @@ use mapper_core::{
     Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour, RigActuators, StructureTolerances,
 };
 use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::rig::sensor_fault::Rest;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -73,9 +74,15 @@ pub struct CommonOffset {
     pub reading: f64,
 }
 
-/// Pressure of the isothermal zero of the pressure sensors, Pa; 0 without a zero.
-pub fn rest_pressure_pa(common: &[CommonOffset]) -> f64 {
-    common.iter().find(|common| common.channels.contains(&Channel::P1)).map_or(0.0, |common| common.reading)
+/// Readings of the isothermal zero, from which gain errors count.
+pub fn rest(common: &[CommonOffset]) -> Rest {
+    let of = |channel| common.iter().find(|common| common.channels.contains(&channel));
+    let (pressure, temperature) = (of(Channel::P1), of(Channel::T2));
+    let without = Rest::default();
+    Rest {
+        pressure_pa: pressure.map_or(without.pressure_pa, |common| common.reading),
+        temperature_k: temperature.map_or(without.temperature_k, |common| common.reading),
+    }
 }
 
 impl Declared {
@@ -91,9 +98,9 @@ impl Declared {
         self
     }
 
-    /// Pressure from which gain errors of the pressure sensors count, Pa.
-    pub fn rest_pressure_pa(&self) -> f64 {
-        rest_pressure_pa(&self.common_offsets)
+    /// Readings from which gain errors count.
+    pub fn rest(&self) -> Rest {
+        rest(&self.common_offsets)
     }
 
     /// Noise of one sample, in the channel's unit: the declared one, otherwise that of a typical sensor.

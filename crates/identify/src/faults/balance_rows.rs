@@ -3,7 +3,7 @@
 use crate::faults::end_readings::{CHANNELS, PerChannel, Readings};
 use mapper_core::{Channel, FaultKind};
 use mapper_inference::hypotheses::Balance;
-use mapper_physics::rig::sensor_fault::{SensorFault, additive, gain_error};
+use mapper_physics::rig::sensor_fault::{SensorFault, additive};
 use nalgebra::{DMatrix, DVector};
 
 /// A balance of the recording.
@@ -65,8 +65,8 @@ impl Rows {
                 return 0.0;
             }
             let housing_k = readings.tc_k();
-            let Readings { values, run_ratio, rest_pressure_pa, .. } = readings;
-            fault.error_per_unit(CHANNELS[channel], values[channel], housing_k, *run_ratio, *rest_pressure_pa)
+            let Readings { values, run_ratio, rest, .. } = readings;
+            fault.error_per_unit(CHANNELS[channel], values[channel], housing_k, *run_ratio, *rest)
         });
         fault
             .channels
@@ -94,9 +94,8 @@ impl Rows {
         let offsets =
             (0..CHANNELS.len()).map(|channel| self.column(|other, _| f64::from(u8::from(other == channel))));
         let gains = (0..CHANNELS.len()).map(|channel| {
-            let error = |readings: &Readings| {
-                gain_error(CHANNELS[channel], readings.values[channel], readings.rest_pressure_pa)
-            };
+            let error =
+                |readings: &Readings| readings.rest.gain_error(CHANNELS[channel], readings.values[channel]);
             self.column(|other, readings| if other == channel { error(readings) } else { 0.0 })
         });
         let pressure = |channel: usize| matches!(CHANNELS[channel], Channel::P1 | Channel::P2);

@@ -28,15 +28,14 @@ use mapper_inference::hypotheses::{Likelihood, Member, Priors};
 use mapper_inference::mixture::MIN_WEIGHT;
 use mapper_inference::posterior::EXCLUDED_ODDS;
 use mapper_numerics::statistics::EXCLUDE_SIGMAS;
-use mapper_physics::rig::sensor_fault::additive;
+use mapper_physics::rig::sensor_fault::{Rest, additive};
 
-/// Prior probability of a fault. Judgement: one recording in ten has one. Judgement; docs/validation/faults.md uses the same value.
+/// Prior probability of a fault. Judgement: one recording in ten has one; docs/validation/faults.md uses the same value.
 const EXPECTED_FAULTS: f64 = 0.1;
 /// Deviation of a machine from its declaration, ratio, one standard deviation. Bound: another machine of the same series.
 const OTHER_MACHINE_RATIO: f64 = 0.05;
 /// The same of convection. Source: correlations of heat transfer in pipes scatter by that much (Incropera, ch. 8.5).
 const OTHER_CONVECTION_RATIO: f64 = 0.2;
-
 /// Play of a worn drive, opening, one standard deviation. Bound: twice that of a new pneumatic positioner.
 const OTHER_PLAY: f64 = 0.04;
 
@@ -49,7 +48,7 @@ pub(crate) fn likelihood(
     config: &IdentifyConfig,
     nominal: Option<&NominalRig<'_>>,
 ) -> Option<(Likelihood, Priors)> {
-    let all = all_readings(recording, ends, config.rest_pressure_pa)?;
+    let all = all_readings(recording, ends, config.rest)?;
     let readings: Vec<Readings> = all.iter().flatten().copied().collect();
     let opening = |((end, readings), side): ((&Option<Ends>, &Option<Readings>), f64)| {
         let position = end.as_ref()?.valve_opening_ratio - 0.5 * config.valve_play_ratio * side;
@@ -64,6 +63,7 @@ pub(crate) fn likelihood(
     balances.extend(balances::head::rows(&readings, &noise, reference, nominal));
     let used: Vec<bool> = all.iter().map(Option::is_some).collect();
     balances.extend(balances::housing::rows(recording, config, &used));
+    balances.extend(balances::inlet::rows(recording, &all, config));
     balances.extend(fitted.and_then(|fitted| balances::efficiency::rows(fitted, &all, reference, nominal)));
     if let Some(nominal) = nominal {
         balances.extend(fitted.and_then(|fitted| balances::convection::rows(fitted, &all, config, nominal)));
@@ -141,13 +141,13 @@ pub(crate) fn suspect(index: usize) -> Suspect {
 pub(crate) fn all_readings(
     recording: &Recording,
     ends: &[Option<Ends>],
-    rest_pressure_pa: f64,
+    rest: Rest,
 ) -> Option<Vec<Option<Readings>>> {
     let (first_s, last_s) = span_s(recording)?;
     let every = ends.len().div_ceil(MAX_CORRELATED_ROWS).max(1);
     let of = |(position, end): (usize, &Option<Ends>)| {
         let used = end.as_ref().filter(|_| position.is_multiple_of(every))?;
-        Some(Readings::of(used, first_s, last_s, rest_pressure_pa))
+        Some(Readings::of(used, first_s, last_s, rest))
     };
     Some(ends.iter().enumerate().map(of).collect())
 }

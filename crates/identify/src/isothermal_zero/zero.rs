@@ -17,8 +17,8 @@ use mapper_core::unit_factors::S_PER_MIN;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, SAMPLE_INTERVAL_S, Soak};
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
-use mapper_observe::declared::{CommonOffset, rest_pressure_pa, usual_noise_sigma};
-use mapper_physics::rig::sensor_fault::gain_error;
+use mapper_observe::declared::{CommonOffset, rest, usual_noise_sigma};
+use mapper_physics::rig::sensor_fault::Rest;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -294,7 +294,7 @@ impl SoakReadings<'_> {
         let third_s = (end_s - start_s) / SOAK_PARTS;
         let of_third = sigma_of_mean(noise_sigma, third_s, self.config);
         let drift_sigma = std::f64::consts::SQRT_2 * of_third / (2.0 * third_s / S_PER_MIN);
-        let gain_sigma = declared.gain_sigma_ratio * gain_error(channel, mean, 0.0);
+        let gain_sigma = declared.gain_sigma_ratio * Rest::default().gain_error(channel, mean);
         let total = own.hypot(declared.offset_sigma).hypot(gain_sigma);
         let drift_per_min = reading.drift_per_min;
         Some(Ok(Reading { channel, mean, own, total, drift_per_min, drift_sigma }))
@@ -410,7 +410,7 @@ pub fn zeroed(
     mut config: IdentifyConfig,
     zero: &IsothermalZero,
 ) -> (Recording, IdentifyConfig) {
-    config.rest_pressure_pa = rest_pressure_pa(&zero.common);
+    config.rest = rest(&zero.common);
     for common in &zero.common {
         add_common_error(&mut config, &common.channels, common.sigma);
     }
@@ -449,7 +449,7 @@ pub fn expected_after_zero(
     soak_s: f64,
     pressure_pa: f64,
 ) -> IdentifyConfig {
-    config.rest_pressure_pa = pressure_pa;
+    config.rest.pressure_pa = pressure_pa;
     let used_s = used_s(soak_s, settings);
     for group in groups(settings) {
         let mut members = Vec::new();

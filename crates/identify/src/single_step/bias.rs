@@ -8,7 +8,6 @@ use crate::single_step::fit::{Fit, Geometry, t2_k};
 use crate::step_data::samples::{Row, Samples};
 use mapper_core::Channel;
 use mapper_physics::gas::air::Air;
-use mapper_physics::rig::sensor_fault::gain_error;
 
 /// Step of a derivative by a reading, relative. Bound: between rounding and curvature.
 pub(crate) const READING_STEP_RATIO: f64 = 1e-5;
@@ -42,9 +41,7 @@ pub(crate) fn declared_effect(
         let sensitivity = sensitivity(fit, samples, geometry, channel);
         let rows = || sensitivity.iter().zip(&samples.rows);
         let by_offset_k = rows().map(|(s, _)| s * declared.offset_sigma).collect();
-        let gain = |row: &Row| {
-            declared.gain_sigma_ratio * gain_error(channel, row.read(channel), config.rest_pressure_pa)
-        };
+        let gain = |row: &Row| declared.gain_sigma_ratio * config.rest.gain_error(channel, row.read(channel));
         let by_gain_k = rows().map(|(s, row)| s * gain(row)).collect();
         for (change_k, sigma) in
             [(by_offset_k, declared.offset_sigma), (by_gain_k, declared.gain_sigma_ratio)]

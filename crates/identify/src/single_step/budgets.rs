@@ -5,7 +5,6 @@ use crate::single_step::dynamic::Estimate;
 use mapper_core::{
     BudgetRow, Channel, EstimateUncertainty, IdentifiedPoint, PointBudgets, UncertaintyBudget, half_width_95,
 };
-use mapper_physics::rig::sensor_fault::gain_error;
 
 /// A source with its standard uncertainty in its unit.
 pub(crate) fn row(source: String, sigma: f64, unit: &str, sensitivity: f64, contribution: f64) -> BudgetRow {
@@ -77,7 +76,7 @@ fn pressure_ratio(
             format!("gain of {channel}"),
             declared.gain_sigma_ratio,
             "1",
-            by_reading * gain_error(channel, reading_pa, config.rest_pressure_pa),
+            by_reading * config.rest.gain_error(channel, reading_pa),
         );
         let mean = config.noise().variance_of_mean(samples(channel), config.thresholds.end_mean_s).sqrt();
         push(format!("noise of {channel}"), declared.noise_sigma * mean, "Pa", by_reading);

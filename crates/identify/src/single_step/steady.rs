@@ -15,7 +15,6 @@ use mapper_numerics::statistics::standard_deviation;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::apparent_efficiency;
 use mapper_physics::laws::thermocouple::time_constant_s;
-use mapper_physics::rig::sensor_fault::gain_error;
 
 /// Segment at the end of a step in which temperatures must not drift, s. Bound: with noise of 0.1 K its slope is then known to better
 /// than 0.1 K/min.
@@ -114,7 +113,7 @@ pub(crate) fn uncertainty(
         let step = READING_STEP_RATIO * value;
         let moved = |by: f64| apparent_eta(&means.moved(channel, by, config.air), config.air);
         let slope = (moved(step) - moved(-step)) / (2.0 * step);
-        let by_gain = declared.gain_sigma_ratio * gain_error(channel, value, config.rest_pressure_pa);
+        let by_gain = declared.gain_sigma_ratio * config.rest.gain_error(channel, value);
         let spreads = [declared.offset_sigma, by_gain];
         common.extend(spreads.iter().filter(|sigma| **sigma != 0.0).map(|sigma| slope * sigma));
         declared_square += (slope * declared.noise_sigma).powi(2);

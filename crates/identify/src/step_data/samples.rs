@@ -127,6 +127,14 @@ impl Samples {
         samples
     }
 
+    /// Number of samples per independent one: twice the correlation time of the coloured part of the noise. `None` with fewer than two.
+    pub(crate) fn correlated(&self, config: &IdentifyConfig) -> Option<f64> {
+        let intervals = self.len().checked_sub(1).filter(|intervals| *intervals > 0)?;
+        let interval_s = (self.rows.last()?.t_s - self.rows.first()?.t_s) / intervals as f64;
+        let colour = config.noise();
+        Some(1.0 + 2.0 * colour.first_order_variance_ratio() * colour.time_constant_s / interval_s)
+    }
+
     /// Change of a column over the window: mean of its last `seconds` minus that of its first.
     pub(crate) fn change(&self, of: fn(&Row) -> f64, seconds: f64) -> Option<f64> {
         let (first_s, last_s) = (self.rows.first()?.t_s, self.rows.last()?.t_s);

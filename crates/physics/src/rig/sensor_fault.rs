@@ -5,7 +5,8 @@
 //! share a reference junction, pressure transducers a barometer or a supply.
 
 use crate::rig::effect::{Effect, EffectError, EffectInfo, EffectParameter, NamedValues, Rig, Submodel};
-use mapper_core::{Channel, FaultKind, NOISY_REPEAT_S};
+use mapper_core::{Channel, Dimension, FaultKind, NOISY_REPEAT_S};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::sync::Arc;
 
@@ -181,19 +182,35 @@ const OF_COMPRESSOR: [Channel; 7] = {
 pub fn additive() -> impl Iterator<Item = &'static SensorFault> {
     use FaultKind::{Drift, Gain, Offset, TowardsWall};
     CATALOGUE.iter().filter(|fault| {
-        // Every balance uses T1 as reference, so only a model with T1 as input distinguishes conduction to the wall from a gain error.
         let additive = matches!(fault.kind, Offset | Gain | Drift)
-            || (fault.kind == TowardsWall && fault.channels == [Channel::T2]);
+            || (fault.kind == TowardsWall && matches!(fault.channels, [Channel::T1 | Channel::T2]));
         additive && fault.channels.iter().all(|channel| OF_COMPRESSOR.contains(channel))
     })
 }
 
-/// Error of a reading for a gain error of 1. `rest_pressure_pa`: pressure of the isothermal zero, at which gain errors of pressure sensors
-/// vanish; 0 without a zero.
-pub fn gain_error(channel: Channel, reading: f64, rest_pressure_pa: f64) -> f64 {
-    match channel {
-        Channel::P1 | Channel::P2 => reading - rest_pressure_pa,
-        _ => channel.gain_distance(reading),
+/// Readings at which gain errors vanish: those of an isothermal zero; without one, no pressure and 20 degC.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Rest {
+    /// Of P1 and P2, Pa.
+    pub pressure_pa: f64,
+    /// Of the thermometers, K.
+    pub temperature_k: f64,
+}
+
+impl Default for Rest {
+    fn default() -> Self {
+        Rest { pressure_pa: 0.0, temperature_k: CALIBRATED_AT_K }
+    }
+}
+
+impl Rest {
+    /// Error of a reading for a gain error of 1.
+    pub fn gain_error(&self, channel: Channel, reading: f64) -> f64 {
+        match channel {
+            Channel::P1 | Channel::P2 => reading - self.pressure_pa,
+            _ if channel.info().dimension == Dimension::Temperature => reading - self.temperature_k,
+            _ => channel.gain_distance(reading),
+        }
     }
 }
 
@@ -237,14 +254,14 @@ fn searched_for() -> impl Iterator<Item = SensorFault> {
 
 impl SensorFault {
     /// Error of a channel's reading by a fault of size 1; 0 for kinds that do not add to a reading. `housing_k`: Tc. `run_ratio`: time since
-    /// the start of the run over its length. `rest_pressure_pa`: as for [`gain_error`].
+    /// the start of the run over its length. `rest`: where gain errors vanish.
     pub fn error_per_unit(
         &self,
         channel: Channel,
         reading: f64,
         housing_k: f64,
         run_ratio: f64,
-        rest_pressure_pa: f64,
+        rest: Rest,
     ) -> f64 {
         if !self.channels.contains(&channel) {
             return 0.0;
@@ -252,7 +269,7 @@ impl SensorFault {
         let relative = matches!(channel, Channel::CompressorFlow | Channel::ShaftSpeed);
         match self.kind {
             FaultKind::Offset => 1.0,
-            FaultKind::Gain => gain_error(channel, reading, rest_pressure_pa),
+            FaultKind::Gain => rest.gain_error(channel, reading),
             FaultKind::Drift if relative => run_ratio * reading,
             FaultKind::Drift => run_ratio,
             FaultKind::TowardsWall => housing_k - reading,

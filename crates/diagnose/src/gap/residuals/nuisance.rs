@@ -8,7 +8,6 @@ use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 use mapper_physics::rig::effect::Rig;
 use mapper_physics::rig::instruments::{ChannelPath, ValveMotion};
-use mapper_physics::rig::sensor_fault::gain_error;
 
 /// Outputs of the model that sensors measure, in the order of the residuals.
 pub(crate) const OUTPUTS: [Channel; 9] = {
@@ -204,7 +203,7 @@ pub(crate) fn apply(
         K::Gain(channel) => {
             let path = rig.instruments.path_mut(channel);
             path.gain_ratio *= 1.0 + value;
-            path.offset += value * gain_error(channel, 0.0, declared.rest_pressure_pa());
+            path.offset += value * declared.rest().gain_error(channel, 0.0);
         }
         // The cell sensor reads too high by this amount, so the model is driven with less.
         K::Perturbation(Perturbation::Ambient) => {

@@ -118,12 +118,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
             Channel::T2 | Channel::Tc => part.tc_k,
             _ => f64::NAN,
         });
-        Readings {
-            values,
-            run_ratio: run_ratio(part),
-            rest_pressure_pa: config.rest_pressure_pa,
-            air: config.air,
-        }
+        Readings { values, run_ratio: run_ratio(part), rest: config.rest, air: config.air }
     };
     Some(Rows {
         residual: heat_w,
@@ -197,10 +192,6 @@ fn kept_ratio(samples: &Samples, config: &IdentifyConfig) -> Option<(f64, f64)> 
     let determinant = aa * bb - ab * ab;
     let (kept, of_rise) = ((bb * ay - ab * by) / determinant, (aa * by - ab * ay) / determinant);
     let left: f64 = rows().map(|(a, b, y)| (y - kept * a - of_rise * b).powi(2)).sum();
-    // Number of samples per independent one: twice the correlation time of the coloured part of the noise.
-    let interval_s = (samples.rows.last()?.t_s - samples.rows.first()?.t_s) / (count - 1) as f64;
-    let colour = config.noise();
-    let correlated = 1.0 + 2.0 * colour.first_order_variance_ratio() * colour.time_constant_s / interval_s;
-    let variance = correlated * left / count as f64 * bb / determinant;
+    let variance = samples.correlated(config)? * left / count as f64 * bb / determinant;
     (kept.is_finite() && variance.is_finite() && variance > 0.0).then(|| (kept, variance.sqrt()))
 }

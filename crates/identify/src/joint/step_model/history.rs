@@ -22,7 +22,7 @@ use crate::joint::step_model::parameters::{
 };
 use crate::joint::step_model::rows::{MAX_ROW_GAP_S, Row};
 use crate::joint::step_model::surface::{TERM_COUNT, dot};
-use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
+use mapper_physics::rig::sensor_fault::Rest;
 
 /// Exponent below which the mean over a row replaces the formula. Bound: the next term is below rounding.
 const SERIES_BELOW: f64 = 1e-6;
@@ -63,13 +63,13 @@ pub(crate) fn inner_wall(shared: &SharedVector) -> (f64, f64) {
 }
 
 /// Tc without its errors, K.
-fn outer_k(row: &Row, shared: &SharedVector) -> f64 {
-    row.tc_k + shared[TC_LAG] * row.tc_slope_k_s - tc_error_k(row.tc_k, shared)
+fn outer_k(row: &Row, shared: &SharedVector, rest: Rest) -> f64 {
+    row.tc_k + shared[TC_LAG] * row.tc_slope_k_s - tc_error_k(row.tc_k, shared, rest)
 }
 
 /// Error of T2 at the temperature of its probe's tip, K. At the reading, the noise would be part of the prediction, and a gain would be fitted to it.
-fn t2_error_k(probe_k: f64, shared: &SharedVector) -> f64 {
-    shared[OFFSETS + 1] + shared[THERMOMETERS] + shared[GAINS] * (probe_k - CALIBRATED_AT_K)
+fn t2_error_k(probe_k: f64, shared: &SharedVector, rest: Rest) -> f64 {
+    shared[OFFSETS + 1] + shared[THERMOMETERS] + shared[GAINS] * (probe_k - rest.temperature_k)
 }
 
 /// Mean of `exp(-x s)` over s from 0 to 1.
@@ -85,8 +85,9 @@ impl Model {
         shared: &SharedVector,
         local: &LocalVector,
     ) -> Inputs {
-        let outer_k = outer_k(row, shared);
-        let [p1_pa, p2_pa] = pressures_pa(row, shared, self.setting.rest_pressure_pa);
+        let rest = self.setting.rest;
+        let outer_k = outer_k(row, shared, rest);
+        let [p1_pa, p2_pa] = pressures_pa(row, shared, rest.pressure_pa);
         Inputs {
             t1_k: row.t1_k - shared[OFFSETS] - shared[THERMOMETERS],
             wall_k: outer_k,
@@ -130,7 +131,8 @@ impl Model {
             self.linearised(history, shared, local, derivatives.then_some(with_model), before)
         };
         let mut readings_k = linearised.probe.read(&linearised.gas_k, local[FIRST_READING]);
-        readings_k.iter_mut().for_each(|reading_k| *reading_k += t2_error_k(*reading_k, shared));
+        let rest = self.setting.rest;
+        readings_k.iter_mut().for_each(|reading_k| *reading_k += t2_error_k(*reading_k, shared, rest));
         if self.has_balance {
             readings_k.extend(linearised.tc_k(shared));
         }

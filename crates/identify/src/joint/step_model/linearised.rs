@@ -13,7 +13,7 @@ use crate::joint::step_model::rows::{Row, StepRows};
 use crate::joint::step_model::surface::{TERM_COUNT, dot};
 use crate::single_step::probe::{self, Lag, follow};
 use mapper_core::unit_factors::M_PER_MM;
-use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
+use mapper_physics::rig::sensor_fault::Rest;
 
 /// Step of the derivative by the square of the probe's diameter, relative. Bound: between rounding and curvature.
 const PROBE_STEP_RATIO: f64 = 1e-3;
@@ -154,7 +154,8 @@ impl Linearised<'_> {
             .into_iter()
             .zip(rows)
             .map(|(change_k, row)| {
-                start_k + change_k + tc_error_k(row.tc_k, shared) - shared[TC_LAG] * row.tc_slope_k_s
+                start_k + change_k + tc_error_k(row.tc_k, shared, self.model.setting.rest)
+                    - shared[TC_LAG] * row.tc_slope_k_s
             })
             .collect()
     }
@@ -278,7 +279,7 @@ impl Linearised<'_> {
             .chain(&self.step.rows)
             .skip(history.terms.len() - self.states.len())
             .collect();
-        let rest_pa = self.model.setting.rest_pressure_pa;
+        let Rest { pressure_pa: rest_pa, temperature_k: rest_k } = self.model.setting.rest;
         let by = |change: &dyn Fn(&RowState, &Row, usize) -> Change| {
             self.respond(|i, state| change(state, rows[i], i), start_k)
         };
@@ -312,10 +313,10 @@ impl Linearised<'_> {
             FLOW_GAIN => input(Input::Flow, &|state, _| -state.inputs.flow_kg_s / (1.0 + shared[FLOW_GAIN])),
             T2_GAIN => {
                 let probe_k = self.probe.read(&self.gas_k, local[FIRST_READING]);
-                let distances: Vec<f64> = probe_k.iter().map(|probe_k| probe_k - CALIBRATED_AT_K).collect();
+                let distances: Vec<f64> = probe_k.iter().map(|probe_k| probe_k - rest_k).collect();
                 (self.of_t2(&distances), 0.0)
             }
-            TC_GAIN => by(&|_, row, _| Change::of_tc(CALIBRATED_AT_K - row.tc_k)),
+            TC_GAIN => by(&|_, row, _| Change::of_tc(rest_k - row.tc_k)),
             P1_GAIN => {
                 input(Input::LnPressureRatio, &|state, row| (row.p1_pa - rest_pa) / state.inputs.p1_pa)
             }
@@ -390,8 +391,8 @@ fn integral(rows: &[Row], rates: &[f64]) -> Vec<f64> {
     sums
 }
 
-pub(super) fn tc_error_k(read_k: f64, shared: &SharedVector) -> f64 {
-    shared[OFFSETS + 2] + shared[THERMOMETERS] + shared[GAINS + 1] * (read_k - CALIBRATED_AT_K)
+pub(super) fn tc_error_k(read_k: f64, shared: &SharedVector, rest: Rest) -> f64 {
+    shared[OFFSETS + 2] + shared[THERMOMETERS] + shared[GAINS + 1] * (read_k - rest.temperature_k)
 }
 
 /// The surface coefficients among the shared parameters.
@@ -415,7 +416,7 @@ mod tests {
             internal_area_m2: config.internal_area_m2,
             outlet_diameter_m: config.outlet_diameter_m,
             inlet_diameter_m: config.inlet_diameter_m,
-            rest_pressure_pa: 100e3,
+            rest: Rest { pressure_pa: 100e3, temperature_k: 297.0 },
             air: config.air,
             reynolds_reference: 1.3e5,
         };

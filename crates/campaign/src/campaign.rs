@@ -253,7 +253,7 @@ impl CampaignFile {
         files: &dyn Fn(&Path) -> io::Result<String>,
     ) -> io::Result<(Campaign, Vec<Vec<Step>>)> {
         let (boundary, follow_outlet) = (self.boundary.conditions(), self.boundary.follow_outlet());
-        let limits: Limits = self.limits.into();
+        let limits = Limits::from(&self.limits);
         let rig = self.rig.or_else(|| limits.p3_stroke_s.map(|_| RigFile::default()));
         let reference = self.reference.map_or(ReferenceState::SAE, ReferenceState::from);
         let lines = self.grid.lines(reference, &limits);

@@ -78,6 +78,7 @@ pub use measurement::sensor_fault::{
     COARSE_REPEAT_S, COARSE_REPEAT_SAMPLES, FaultKind, FrozenLimit, NOISY_REPEAT_S, repeats,
 };
 pub use rig::actuators::{ActuatorMotion, RigActuators};
+pub use rig::avoided_speeds::{AvoidedCrossing, AvoidedRange, AvoidedSpeeds, AvoidedTime};
 pub use rig::backend::{
     Backend, BackendCause, BackendError, Clock, PacedClock, RigDescription, RigMode, SetpointRange,
     SetpointRanges, Setpoints, UnpacedClock, WallClock,

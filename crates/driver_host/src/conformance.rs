@@ -152,7 +152,7 @@ fn can_be_guarded(candidate: &Candidate<'_>) -> CheckResult {
     let description = candidate.create()?.describe();
     for name in &description.needs_guarded {
         let channel = match name {
-            GuardName::Overspeed | GuardName::Speed => Channel::ShaftSpeed,
+            GuardName::Overspeed | GuardName::Speed | GuardName::AvoidedSpeed => Channel::ShaftSpeed,
             GuardName::CompressorOutletTemperature => Channel::T2,
             GuardName::TurbineInletTemperature => Channel::T3,
             GuardName::TurbineInletPressure => Channel::P3,

@@ -71,6 +71,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             surge_margin_min_ratio: None,
             housing_gradient_max_k: None,
             overshoot_max_ratio: None,
+            avoid: mapper_core::AvoidedSpeeds::NONE,
         },
         actuators: RigActuators::default(),
         repeats: Some(Repeats { jump: None, every_steps: 12, at_least: 2 }),

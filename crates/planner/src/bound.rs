@@ -200,6 +200,7 @@ mod tests {
                 surge_margin_min_ratio: None,
                 housing_gradient_max_k: None,
                 overshoot_max_ratio: None,
+                avoid: mapper_core::AvoidedSpeeds::NONE,
             },
             actuators: RigActuators::default(),
             repeats: None,

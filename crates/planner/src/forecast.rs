@@ -39,7 +39,7 @@ pub(crate) fn forecast(
 ) -> Result<Forecast, SimulationError> {
     let Some(from) = from else {
         let inputs = TransitionInputs::constant(&target.boundary);
-        let step = forecast_step(request.model, state, &inputs, 0.0, dwell_s)?;
+        let step = forecast_step(request.model, state, &inputs, 0.0, dwell_s, &request.limits.avoid)?;
         return Ok(with_errors(request, step, None, dwell_s, Vec::new()));
     };
     let stand = Stand { limits: &request.limits, actuators: &request.actuators };

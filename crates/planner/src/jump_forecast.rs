@@ -3,7 +3,7 @@
 use crate::forecast::{Forecast, forecast};
 use crate::jump_graph::Rejection;
 use crate::request::{PlanError, PlanRequest, solve_steady_states};
-use mapper_core::{OperatingPoint, Predicted, WindowRule};
+use mapper_core::{AvoidedCrossing, OperatingPoint, Predicted, WindowRule};
 use mapper_numerics::parallel;
 use mapper_physics::simulation::steady::SteadyState;
 
@@ -24,6 +24,8 @@ pub struct JumpForecast {
     pub highest_speed_rpm: f64,
     /// Highest outlet temperature during the jump, K.
     pub highest_t2_k: f64,
+    /// The slowest crossing of speeds to avoid.
+    pub avoided: Option<AvoidedCrossing>,
     /// Turbine inlet total pressure that the jump commands, Pa.
     pub p3_pa: f64,
     /// Change of the turbine inlet pressure, Pa (signed).
@@ -75,6 +77,7 @@ pub(crate) fn forecast_jump(
         lowest_surge_margin_ratio: forecast.step.lowest_surge_margin_ratio,
         highest_speed_rpm: forecast.step.highest_speed_rpm,
         highest_t2_k: forecast.step.highest_t2_k,
+        avoided: forecast.step.avoided,
         p3_pa: target.boundary.p3_pa,
         p3_change_pa: target.boundary.p3_pa - start.boundary.p3_pa,
         rejections: find_rejections(request, &forecast, target),

@@ -1,6 +1,6 @@
 //! The jumps that no limit forbids, as a directed graph: the points that one order can reach, and ways around a forbidden jump.
 
-use mapper_core::{Jump, OperatingPoint, readable, temperature};
+use mapper_core::{AvoidedCrossing, Jump, OperatingPoint, readable, temperature};
 use mapper_physics::operating_point::transition_forecast::{TransitionViolation, surge_excess_ratio};
 use petgraph::algo::{astar, tarjan_scc};
 use petgraph::graphmap::DiGraphMap;
@@ -37,6 +37,11 @@ pub enum Rejection {
          write `window: auto`"
     )]
     Arrival { needed_s: f64, available_s: f64 },
+    #[error(
+        "the shaft is within the speeds to avoid, {} to {} krpm, for {:.1} s; at most {:.1} s are allowed",
+        .0.range.from_rpm / 1e3, .0.range.to_rpm / 1e3, .0.inside_s, .0.range.longest_s
+    )]
+    Avoided(AvoidedCrossing),
 }
 
 impl From<TransitionViolation> for Rejection {
@@ -51,6 +56,7 @@ impl From<TransitionViolation> for Rejection {
             TransitionViolation::Overshoot { highest_rpm, target_rpm, limit_rpm } => {
                 Rejection::Overshoot { highest_rpm, target_rpm, limit_rpm }
             }
+            TransitionViolation::Avoided(crossing) => Rejection::Avoided(crossing),
         }
     }
 }
@@ -68,6 +74,7 @@ impl Rejection {
             Rejection::TurbineInletTemperature { t3_k, limit_k } => t3_k / limit_k,
             Rejection::HousingGradient { gradient_k, limit_k } => gradient_k.abs() / limit_k,
             Rejection::Arrival { needed_s, available_s } => needed_s / available_s,
+            Rejection::Avoided(crossing) => crossing.ratio(),
         }
     }
 }

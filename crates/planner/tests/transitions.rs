@@ -4,7 +4,9 @@
 mod common;
 
 use common::{grid, request};
-use mapper_core::{ActuatorMotion, Dwell, OperatingPoint, Plan, RigActuators, VisitOrder, WindowRule};
+use mapper_core::{
+    ActuatorMotion, AvoidedRange, Dwell, OperatingPoint, Plan, RigActuators, VisitOrder, WindowRule,
+};
 use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanError, PlanRequest, make_plan};
 use proptest::prelude::*;
@@ -73,6 +75,41 @@ proptest! {
             // A point beyond the surge line or the limits: no transition is planned.
             Err(PlanError::Unreachable(_)) => {}
             plan => assert_within_limits(&plan.unwrap(), &request),
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    /// A plan, with its repeats and its ways around forbidden jumps, holds no speed to avoid and crosses it in time; or it is refused.
+    #[test]
+    fn no_step_stays_within_the_speeds_to_avoid(
+        points in points(),
+        actuators in actuators(),
+        (from_rpm, width_rpm, longest_s) in (50e3..150e3f64, 0.5e3..8e3f64, 0.3..5.0f64),
+    ) {
+        let model = Model::nominal();
+        let range = AvoidedRange { from_rpm, to_rpm: from_rpm + width_rpm, longest_s };
+        let mut request = stand(&model, &points, actuators);
+        (request.order, request.effort) = (VisitOrder::ThermalGradient, 0.1);
+        request.return_to_first = true;
+        request.limits.avoid = vec![range].into();
+        let is_inside = |point: &OperatingPoint| (range.from_rpm..=range.to_rpm).contains(&point.speed_rpm);
+        let any_inside = points.iter().any(is_inside);
+        match make_plan(&request) {
+            Err(PlanError::Unreachable(_)) => {}
+            _ if any_inside => prop_assert!(false, "a point inside was accepted"),
+            Err(PlanError::NoAdmissibleOrder { .. } | PlanError::SeparatePoints(_)) => {}
+            plan => for step in &plan.unwrap().steps {
+                prop_assert!(!is_inside(&step.to), "{step:?}");
+                let inside_s = step.transition.and_then(|way| way.avoided).map_or(0.0, |way| way.inside_s);
+                prop_assert!(inside_s <= longest_s, "{step:?}");
+                let crosses = step.from.is_some_and(|from| {
+                    let (low, high) = (from.speed_rpm.min(step.to.speed_rpm), from.speed_rpm.max(step.to.speed_rpm));
+                    low < range.from_rpm && high > range.to_rpm
+                });
+                prop_assert!(!crosses || inside_s > 0.0, "a crossing takes time: {step:?}");
+            },
         }
     }
 }

@@ -17,6 +17,7 @@ mod surge_search;
 pub use auxiliary_instruments::{AuxiliaryInstrument, RigWithInstruments};
 pub use deadline::{DeadlineBackend, Deadlines};
 pub use drift_watch::DriftWatch;
+pub use guards::avoided_speed_watch::AvoidedSpeedWatch;
 pub use guards::guard::{CommandedState, Guard};
 pub use guards::plausibility_watch::{PlausibilityWatch, ReadingBounds};
 pub use guards::rig_watch::{BatchWatch, REQUIRED_CHANNELS, RigWatch, StartCheck};

@@ -110,7 +110,8 @@ impl NominalForecast {
             }
             None => {
                 let inputs = TransitionInputs::constant(&target.boundary);
-                (forecast_step(&request.model, state, &inputs, 0.0, dwell_s)?, None, dwell_s)
+                let avoid = &request.limits.avoid;
+                (forecast_step(&request.model, state, &inputs, 0.0, dwell_s, avoid)?, None, dwell_s)
             }
         };
         self.planned = Some((dwell_s, step.end));

@@ -36,6 +36,7 @@ fn request() -> SequenceRequest {
             surge_margin_min_ratio: None,
             housing_gradient_max_k: None,
             overshoot_max_ratio: None,
+            avoid: mapper_core::AvoidedSpeeds::NONE,
         },
         accepts: Some(SetpointRanges {
             p3_pa: SetpointRange { low: 50e3, high: 2e6 },

@@ -7,7 +7,7 @@ use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_campaign::CampaignError;
 use mapper_campaign::campaign::Date;
-use mapper_report::{CheckedCampaign, Describe};
+use mapper_report::{CheckedCampaign, Describe, with_messages};
 use mapper_session::{Session, nominal_model};
 use serde_json::json;
 use std::path::PathBuf;
@@ -64,6 +64,7 @@ impl Check {
                 "backend": campaign.backend.name,
                 "expected": forecast.verdicts,
                 "advice": forecast.advice,
+                "avoided": with_messages(|| json!(forecast.avoided)),
                 "findings": [],
                 "omitted": 0,
                 "warnings": warnings.list,
@@ -82,6 +83,7 @@ impl Check {
                 warnings: warnings.count(),
                 verdicts: forecast.verdicts,
                 advice: &forecast.advice,
+                avoided: forecast.avoided.as_ref(),
                 lines: &lines,
             }
             .document(),

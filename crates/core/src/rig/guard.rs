@@ -24,6 +24,8 @@ named_enum! {
         Surge = "surge",
         /// A target speed that is missed at the end of the step.
         Speed = "speed",
+        /// Time within the speeds to avoid.
+        AvoidedSpeed = "avoided_speed",
         /// Samples in order, in time, and not frozen.
         Signals = "signals",
         /// The state that the rig reports.

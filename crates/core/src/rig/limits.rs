@@ -1,6 +1,8 @@
 //! Limits and settings of a run: limits of the machine, soak, speed control, run-down, reaction to drift.
 
-use crate::{Channel, OperatingPoint, RigMode, SafeTrajectory, SetpointRange, SetpointRanges, Setpoints};
+use crate::{
+    AvoidedSpeeds, Channel, OperatingPoint, RigMode, SafeTrajectory, SetpointRange, SetpointRanges, Setpoints,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +34,9 @@ pub struct Limits {
     /// [`Limits::OVERSHOOT_RATIO`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub overshoot_max_ratio: Option<f64>,
+    /// Speeds that a jump crosses and no step holds.
+    #[serde(default, skip_serializing_if = "AvoidedSpeeds::is_empty")]
+    pub avoid: AvoidedSpeeds,
 }
 
 impl Limits {

@@ -1,9 +1,9 @@
 //! The plan as data: steps, their order, and the expected results.
 
-use crate::OperatingPoint;
 use crate::test_plan::plan_remark::{NoBound, PlanRemark, deserialize_no_bound, deserialize_remarks};
 use crate::test_plan::transition::Transition;
 use crate::unit_factors::S_PER_MIN;
+use crate::{AvoidedCrossing, AvoidedRange, OperatingPoint, step_number};
 use serde::{Deserialize, Serialize};
 
 /// Whether a step measures a point for the map or revisits one.
@@ -218,6 +218,15 @@ fn is_zero(value: &f64) -> bool {
 }
 
 impl Plan {
+    /// The remark about the slowest crossing of speeds to avoid; `None` if no jump crosses any.
+    pub fn avoided_crossing(&self) -> Option<PlanRemark> {
+        let crossings = self.steps.iter().filter_map(|step| Some((step.index, step.transition?.avoided?)));
+        let (index, crossing) = crossings.max_by(|a, b| a.1.ratio().total_cmp(&b.1.ratio()))?;
+        let AvoidedCrossing { range: AvoidedRange { from_rpm, to_rpm, longest_s }, inside_s } = crossing;
+        let step = step_number(index);
+        Some(PlanRemark::AvoidedCrossing { step, from_rpm, to_rpm, inside_s, longest_s })
+    }
+
     /// Duration of the whole run, warm-up, cool-down and the search for surge included, s.
     pub fn duration_s(&self) -> f64 {
         let steps_s = self.steps.iter().map(|step| step.dwell_s).sum::<f64>();

@@ -32,6 +32,8 @@ PlanRemark {
     /// A guard ends the rehearsal on the nominal machine in the step to this point: its report, and the highest speed of all steps if the
     /// guard is that of the speed.
     "guard_trip" GuardTrip { guard: GuardName, to: OperatingPoint, reason: String, highest_speed_rpm: Option<f64> },
+    /// The slowest crossing of the speeds to avoid, in the step with this number from 1.
+    "avoided_crossing" AvoidedCrossing { step: usize, from_rpm: f64, to_rpm: f64, inside_s: f64, longest_s: f64 },
     /// Offsets that remain after the soak, in the channels' units, and those after a longer soak that would clearly reduce them.
     "offsets_after_soak" OffsetsAfterSoak {
         soak_s: f64, offset_sigmas: BTreeMap<Channel, f64>, longer_soak_s: f64, longer_offset_sigmas: BTreeMap<Channel, f64>

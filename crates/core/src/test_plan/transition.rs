@@ -1,6 +1,6 @@
 //! The way of a stand from one point to the next: ramps of P3 and valve, and what the forecast expects of them.
 
-use crate::RigActuators;
+use crate::{AvoidedCrossing, RigActuators};
 use serde::{Deserialize, Serialize};
 
 /// A ramp of a command, from its value before the step to that of the step.
@@ -81,6 +81,9 @@ pub struct Transition {
     pub lowest_surge_margin_ratio: f64,
     /// Highest outlet temperature of the step, K.
     pub highest_t2_k: f64,
+    /// The slowest crossing of speeds to avoid; `None` if the shaft is never inside.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub avoided: Option<AvoidedCrossing>,
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use crate::operating_point::transition::TransitionInputs;
 use crate::simulation::inputs::Inputs;
 use crate::simulation::model::{Model, State};
 use crate::simulation::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, SimulationError, Simulator, Watch};
-use mapper_core::{Predicted, SettleBands, WindowRule};
+use mapper_core::{AvoidedCrossing, AvoidedSpeeds, AvoidedTime, Predicted, SettleBands, WindowRule};
 
 /// Interval of a forecast's samples, s.
 const SAMPLE_S: f64 = 0.5;
@@ -58,6 +58,8 @@ pub struct StepForecast {
     pub highest_t2_k: f64,
     /// Lowest surge margin during the step: flow over the surge flow at equal corrected speed, minus one.
     pub lowest_surge_margin_ratio: f64,
+    /// The slowest crossing of speeds to avoid.
+    pub avoided: Option<AvoidedCrossing>,
 }
 
 /// The machine after `duration_s` at `boundary`.
@@ -90,7 +92,7 @@ pub fn warm_up_state(
     hold(model, State { tc_k: ambient_k, tt_k: ambient_k, ..first }, boundary, warm_up_s)
 }
 
-/// The step of `dwell_s` from `state` under `inputs`, which move until `arrival_s`.
+/// The step of `dwell_s` from `state` under `inputs`, which move until `arrival_s`, and the time of its shaft inside the speeds to `avoid`.
 ///
 /// # Errors
 /// [`SimulationError`] if the simulation fails.
@@ -100,6 +102,7 @@ pub fn forecast_step(
     inputs: &TransitionInputs,
     arrival_s: f64,
     dwell_s: f64,
+    avoid: &AvoidedSpeeds,
 ) -> Result<StepForecast, SimulationError> {
     let mut simulator = Simulator::new(model, 0.0, state, DEFAULT_RELATIVE_TOLERANCE, Watch::default());
     let mut rows: Vec<ForecastRow> = Vec::new();
@@ -108,7 +111,7 @@ pub fn forecast_step(
     let times = sample_times(interval_s, fine_end_s, dwell_s);
     let mut are_rows = times.iter().map(|(_, is_row)| *is_row);
     let (mut lowest_margin_ratio, mut highest_rpm, mut highest_t2_k) = (f64::INFINITY, 0.0f64, 0.0f64);
-    let mut crossed = false;
+    let (mut crossed, mut avoided) = (false, AvoidedTime::default());
     simulator.run_to(
         dwell_s,
         inputs,
@@ -120,6 +123,7 @@ pub fn forecast_step(
             let margin_ratio = outputs.flow_corrected_kg_s / model.map.surge_point(corrected_rpm).0 - 1.0;
             lowest_margin_ratio = lowest_margin_ratio.min(margin_ratio);
             highest_rpm = highest_rpm.max(speed_rpm);
+            avoided.add(avoid, t_s, speed_rpm);
             highest_t2_k = highest_t2_k.max(outputs.t2_probe_k);
             if are_rows.next() == Some(true) {
                 rows.push(ForecastRow {
@@ -146,6 +150,7 @@ pub fn forecast_step(
         highest_speed_rpm: highest_rpm,
         highest_t2_k,
         lowest_surge_margin_ratio: lowest_margin_ratio,
+        avoided: avoided.slowest(avoid),
         end: simulator.state(),
         interval_s,
         rows,
@@ -222,9 +227,15 @@ mod tests {
         let model = Model::nominal();
         let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..BoundaryConditions::default() };
         let rest = hold_speed(&model, 110e3, &boundary).unwrap();
-        let forecast =
-            forecast_step(&model, rest.state, &TransitionInputs::constant(&rest.boundary), 0.0, 120.0)
-                .unwrap();
+        let forecast = forecast_step(
+            &model,
+            rest.state,
+            &TransitionInputs::constant(&rest.boundary),
+            0.0,
+            120.0,
+            &AvoidedSpeeds::NONE,
+        )
+        .unwrap();
         let predicted = forecast.predicted(&WindowRule::Auto, &SettleBands::default(), true);
         assert_eq!(predicted.settle_s, Some(0.0));
         // The integration's tolerance of 1e-6 at 400 K.
@@ -238,9 +249,15 @@ mod tests {
         let model = Model::nominal();
         let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..BoundaryConditions::default() };
         let rest = hold_speed(&model, 110e3, &boundary).unwrap();
-        let forecast =
-            forecast_step(&model, rest.state, &TransitionInputs::constant(&rest.boundary), 0.0, 120.0)
-                .unwrap();
+        let forecast = forecast_step(
+            &model,
+            rest.state,
+            &TransitionInputs::constant(&rest.boundary),
+            0.0,
+            120.0,
+            &AvoidedSpeeds::NONE,
+        )
+        .unwrap();
         let window = forecast.window((10.0, 110.0));
         assert_eq!((window[0].t_s, window[window.len() - 1].t_s), (10.0, 110.0));
         assert!(forecast.window((130.0, 140.0)).is_empty());

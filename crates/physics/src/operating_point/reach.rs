@@ -4,7 +4,7 @@ use crate::machine::params::BoundaryConditions;
 use crate::simulation::model::Model;
 use crate::simulation::steady;
 use crate::simulation::steady::{SteadyError, SteadyState};
-use mapper_core::{Limits, OperatingPoint, temperature};
+use mapper_core::{AvoidedRange, Limits, OperatingPoint, readable, temperature};
 use serde::{Deserialize, Serialize};
 
 /// Temperatures that follow the compressor's outlet temperature.
@@ -63,7 +63,7 @@ pub fn hold_speed(
 }
 
 /// A reason why a point cannot be reached; its text continues a sentence that starts with the point's name.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum Obstacle {
     #[error("is outside the valve's range, above 0 to {highest_ratio}")]
@@ -72,6 +72,11 @@ pub enum Obstacle {
     NoSteadyState(#[source] SteadyError),
     #[error("is above the speed limit, `limits.speed` = {} krpm", .limit_rpm / 1e3)]
     Speed { limit_rpm: f64 },
+    #[error(
+        "is within the speeds to avoid, `limits.avoid` from {} to {} krpm; the nearest allowed {}",
+        .range.from_rpm / 1e3, .range.to_rpm / 1e3, nearest_speeds(.nearest_rpm)
+    )]
+    Avoided { range: AvoidedRange, nearest_rpm: Vec<f64> },
     #[error(
         "is beyond the surge line of the nominal map, at {:.0} % of the surge flow", 100.0 * (1.0 + .margin_ratio)
     )]
@@ -99,12 +104,26 @@ pub enum Obstacle {
     T3 { t3_k: f64, limit_k: f64 },
 }
 
+/// The remedy for a speed that is to be avoided.
+pub const AVOIDED_REMEDY: &str =
+    "choose an allowed speed, or narrow the range if the machine allows it; no step may stay inside";
+
+/// Names the nearest allowed speeds, after "the nearest allowed".
+pub fn nearest_speeds(nearest_rpm: &[f64]) -> String {
+    let shown = |rpm: &f64| readable(*rpm, "rpm");
+    match nearest_rpm {
+        [below_rpm, above_rpm] => format!("speeds are {} and {}", shown(below_rpm), shown(above_rpm)),
+        other => format!("speed is {}", other.iter().map(shown).collect::<String>()),
+    }
+}
+
 impl Obstacle {
     /// Key of the limit below `limits`; `None` for an obstacle of the machine or the valve.
     pub fn limit(&self) -> Option<&'static [&'static str]> {
         match self {
             Obstacle::Opening { .. } | Obstacle::NoSteadyState(_) | Obstacle::Surge { .. } => None,
             Obstacle::Speed { .. } => Some(&["speed"]),
+            Obstacle::Avoided { .. } => Some(&["avoid"]),
             Obstacle::SurgeMargin { .. } => Some(&["surge_margin"]),
             Obstacle::HighP3 { .. } => Some(&["turbine_inlet_pressure", "max"]),
             Obstacle::LowP3 { .. } => Some(&["turbine_inlet_pressure", "min"]),
@@ -121,6 +140,7 @@ impl Obstacle {
             Obstacle::Speed { .. } => {
                 "choose a lower speed, or raise the limit if the machine allows it; the limits apply to scripts too"
             }
+            Obstacle::Avoided { .. } => AVOIDED_REMEDY,
             Obstacle::Surge { .. } => "remove the point, or open the valve further",
             Obstacle::SurgeMargin { .. } => {
                 "remove the point, open the valve further, or lower the limit if the rig allows it"
@@ -152,6 +172,9 @@ pub fn reach(
     let mut obstacles = Vec::new();
     if point.speed_rpm > limits.speed_max_rpm {
         obstacles.push(Obstacle::Speed { limit_rpm: limits.speed_max_rpm });
+    }
+    if let Some((range, nearest_rpm)) = limits.avoid.at(point.speed_rpm, limits.speed_max_rpm) {
+        obstacles.push(Obstacle::Avoided { range, nearest_rpm });
     }
     let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..*boundary };
     match hold_speed(model, point.speed_rpm, &boundary, follow) {
@@ -243,6 +266,7 @@ mod tests {
         surge_margin_min_ratio: None,
         housing_gradient_max_k: None,
         overshoot_max_ratio: None,
+        avoid: mapper_core::AvoidedSpeeds::NONE,
     };
 
     fn at(speed_rpm: f64, valve_opening_ratio: f64, limits: &Limits) -> Result<SteadyState, Vec<Obstacle>> {

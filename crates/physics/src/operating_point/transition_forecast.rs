@@ -5,7 +5,7 @@ use crate::operating_point::transition::{TransitionInputs, arrival_s, candidate_
 use crate::simulation::model::{Model, State};
 use crate::simulation::simulate::SimulationError;
 use crate::simulation::steady::SteadyState;
-use mapper_core::{Limits, Ramps, RigActuators, Transition, WindowRule};
+use mapper_core::{AvoidedCrossing, Limits, Ramps, RigActuators, Transition, WindowRule};
 
 /// A limit that a transition violates on its way.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,6 +33,8 @@ pub enum TransitionViolation {
         /// Highest allowed speed.
         limit_rpm: f64,
     },
+    /// The shaft crosses speeds to avoid too slowly.
+    Avoided(AvoidedCrossing),
 }
 
 impl TransitionViolation {
@@ -44,6 +46,7 @@ impl TransitionViolation {
             }
             TransitionViolation::Overspeed { highest_rpm, limit_rpm }
             | TransitionViolation::Overshoot { highest_rpm, limit_rpm, .. } => highest_rpm / limit_rpm,
+            TransitionViolation::Avoided(crossing) => crossing.ratio(),
         }
     }
 }
@@ -116,13 +119,14 @@ fn forecast_on_ramps(
     let arrival_s = arrival_s(&ramps, stand.actuators);
     let dwell_s = extended_dwell_s(dwell_s, arrival_s);
     let inputs = TransitionInputs::new(&from.boundary, &target.boundary, &ramps, stand.actuators);
-    let step = forecast_step(model, state, &inputs, arrival_s, dwell_s)?;
+    let step = forecast_step(model, state, &inputs, arrival_s, dwell_s, &stand.limits.avoid)?;
     let transition = Transition {
         ramps,
         arrival_s,
         highest_speed_rpm: step.highest_speed_rpm,
         lowest_surge_margin_ratio: step.lowest_surge_margin_ratio,
         highest_t2_k: step.highest_t2_k,
+        avoided: step.avoided,
     };
     let violations = find_violations(model, &step, (from, target), stand.limits);
     Ok(TransitionForecast { step, transition, dwell_s, violations })
@@ -154,5 +158,6 @@ fn find_violations(
         target_rpm,
         limit_rpm,
     });
-    [surges, overspeeds, overshoots].into_iter().flatten().collect()
+    let slow = step.avoided.filter(|crossing| crossing.ratio() > 1.0).map(TransitionViolation::Avoided);
+    [surges, overspeeds, overshoots, slow].into_iter().flatten().collect()
 }

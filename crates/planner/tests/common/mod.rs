@@ -41,6 +41,7 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
             surge_margin_min_ratio: None,
             housing_gradient_max_k: None,
             overshoot_max_ratio: None,
+            avoid: mapper_core::AvoidedSpeeds::NONE,
         },
         actuators: RigActuators::default(),
         repeats: None,

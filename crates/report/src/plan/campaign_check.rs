@@ -1,11 +1,13 @@
 //! The outcome of the check of a campaign: its size, the expected verdicts, assumed sizes and resolved speed lines.
 
 use crate::document::{Document, Table};
-use crate::formatting::{Display, duration, percent};
+use crate::formatting::{Display, Message, duration, percent};
 use crate::test_report::key_figures::assumed_keys;
 use crate::test_report::zero_and_sensors::declared_sensors;
 use mapper_campaign::{Campaign, ResolvedLine, ResolvedPoint};
-use mapper_core::{Advice, CampaignChange, Channel, UndeclaredForecast, VerdictForecast, half_width_95};
+use mapper_core::{
+    Advice, CampaignChange, Channel, PlanRemark, UndeclaredForecast, VerdictForecast, half_width_95,
+};
 use std::path::Path;
 
 /// A campaign without mistakes.
@@ -27,6 +29,8 @@ pub struct CheckedCampaign<'a> {
     pub verdicts: Option<VerdictForecast>,
     /// Changes that improve them.
     pub advice: &'a [Advice],
+    /// The slowest crossing of the speeds to avoid.
+    pub avoided: Option<&'a PlanRemark>,
     /// The resolved speed lines.
     pub lines: &'a [ResolvedLine],
 }
@@ -52,6 +56,7 @@ impl crate::document::Describe for CheckedCampaign<'_> {
         if let Some(forecast) = self.verdicts {
             add_forecast(&mut document, campaign, &forecast, self.advice);
         }
+        document.text(self.avoided.map(Message::message).unwrap_or_default());
         document.list(declared_sensors(campaign));
         document.text(assumed_keys(campaign).unwrap_or_default());
         add_lines(&mut document, campaign, self.lines);

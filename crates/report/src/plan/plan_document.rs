@@ -5,8 +5,8 @@ use crate::formatting::{Display, Message, duration, eta, number, percent};
 use crate::plan::plan_remark_text::no_bound_text;
 use mapper_campaign::Campaign;
 use mapper_core::{
-    Plan, PlanBound, PlanStep, Recording, StepKind, Transition, VisitOrder, WindowRule, standard_error_of,
-    step_number,
+    AvoidedCrossing, Plan, PlanBound, PlanStep, Recording, StepKind, Transition, VisitOrder, WindowRule,
+    standard_error_of, step_number,
 };
 use mapper_planner::{JumpForecast, STABLE_DRIFT_K_MIN};
 use mapper_recording::score::ScoredPoint;
@@ -282,6 +282,7 @@ pub fn jump_json(jump: &JumpForecast) -> serde_json::Value {
         "lowest_surge_margin_ratio": jump.lowest_surge_margin_ratio,
         "highest_speed_rpm": jump.highest_speed_rpm,
         "highest_t2_k": jump.highest_t2_k,
+        "avoided": jump.avoided,
         "allowed": jump.rejections.is_empty(),
         "rejections": jump.rejections.iter().map(ToString::to_string).collect::<Vec<_>>(),
     })
@@ -320,12 +321,19 @@ pub fn jump_forecast(campaign: &Campaign, jump: &JumpForecast) -> Document {
             format!("{} {}", display.temperature(jump.highest_t2_k), campaign.display.temperature),
         ),
     ];
-    document.facts("", rows);
+    let avoided = jump.avoided.map(|crossing| ("within speeds to avoid", avoided_time(&crossing)));
+    document.facts("", rows.into_iter().chain(avoided));
     if jump.rejections.is_empty() {
         document.text("Allowed.");
     }
     jump.rejections.iter().for_each(|rejection| document.text(format!("Not allowed: {rejection}.")));
     document
+}
+
+/// The time within a range of speeds to avoid.
+pub(crate) fn avoided_time(AvoidedCrossing { range, inside_s }: &AvoidedCrossing) -> String {
+    let (from_krpm, to_krpm) = (range.from_rpm / 1e3, range.to_rpm / 1e3);
+    format!("{inside_s:.1} s in {from_krpm} to {to_krpm} krpm, {:.1} s allowed", range.longest_s)
 }
 
 /// A row for each step of the plan.

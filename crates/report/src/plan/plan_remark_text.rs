@@ -55,6 +55,14 @@ impl Message for PlanRemark {
                 100.0 * eta_sigma,
                 100.0 * required_eta_sigma
             ),
+            PlanRemark::AvoidedCrossing { step, from_rpm, to_rpm, inside_s, longest_s } => format!(
+                "no step stays within the speeds to avoid; the slowest crossing of {} to {} krpm takes {inside_s:.1} s (step {step}, {:.1} \
+                 krpm/s), {} the {longest_s:.1} s that are allowed",
+                from_rpm / 1e3,
+                to_rpm / 1e3,
+                1e-3 * (to_rpm - from_rpm) / inside_s,
+                if inside_s > longest_s { "longer than" } else { "within" }
+            ),
             PlanRemark::SurgeSearch { lines, closest_margin_ratio, steps, duration_s } => format!(
                 "a search for surge follows at the ends of {lines} speed lines, no nearer than a margin of {:.1} %: about {steps} steps, \
                  {:.0} min, included in the rig time",

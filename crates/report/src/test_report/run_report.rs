@@ -4,7 +4,7 @@ use crate::diagnosis::gap_results::correction_table;
 use crate::document::{Document, Table};
 use crate::formatting::{Display, Message, duration};
 use crate::page::widgets::{OtherRun, map_widget, plan_widget, step_widget};
-use crate::plan::plan_document::executed_plan_table;
+use crate::plan::plan_document::{avoided_time, executed_plan_table};
 use crate::point_results::budget_table::budget_section;
 use crate::point_results::point_warnings::doubts;
 use crate::point_results::points::{
@@ -18,8 +18,8 @@ use crate::test_report::key_figures::{PointsOrigin, assumed_sentence, key_figure
 use crate::test_report::zero_and_sensors::zero_sentence;
 use mapper_campaign::Campaign;
 use mapper_core::{
-    Channel, DeclaredUncertainty, Event, EventKind, Method, Plan, PointBudgets, Recording, ReferenceState,
-    StepKind, Verdict,
+    AvoidedCrossing, AvoidedTime, Channel, DeclaredUncertainty, Event, EventKind, Method, Plan, PointBudgets,
+    Recording, ReferenceState, StepKind, Verdict, step_number,
 };
 use mapper_diagnose::gap::{Diagnosed, PointCorrection};
 use mapper_identify::{FittedReadings, ZeroOutcome};
@@ -298,9 +298,27 @@ impl RunReport<'_> {
             plan.objective,
             duration(plan.duration_s())
         ));
+        if let Some((step, crossing)) = self.slowest_crossing() {
+            document.text(format!(
+                "The longest time within the speeds to avoid was {}, in step {step}.",
+                avoided_time(&crossing)
+            ));
+        }
         document.widget(plan_widget(), "");
         document.table(executed_plan_table(plan, self.recording, self.results.points, display));
         document
+    }
+
+    /// The step, by its number, with the slowest recorded crossing of the speeds to avoid.
+    fn slowest_crossing(&self) -> Option<(usize, AvoidedCrossing)> {
+        let avoid = self.campaign?.limits.avoid;
+        let crossings = self.recording.steps.iter().filter_map(|step| {
+            let speed = self.recording.series.get(&Channel::ShaftSpeed)?;
+            let mut time = AvoidedTime::default();
+            time.add_all(&avoid, speed.slice(step.start_s, step.end_s));
+            Some((step_number(step.index), time.slowest(&avoid)?))
+        });
+        crossings.max_by(|a, b| a.1.ratio().total_cmp(&b.1.ratio()))
     }
 
     fn notes(&self, display: &Display) -> Document {

@@ -208,6 +208,7 @@ impl Run<'_, '_> {
 
     /// Executes one step, and repeats it once if a guard requests smaller steps.
     fn step(&mut self, step: &PlanStep) -> Result<(), Halt> {
+        self.refuse_avoided(step)?;
         let before = self.sent;
         let mut repeats = false;
         loop {
@@ -258,7 +259,17 @@ impl Run<'_, '_> {
                 }
             };
             self.runner.observer.on_step_abandoned(&marker)?;
+            // Smaller steps would stop the shaft inside.
+            let crosses = self
+                .protection
+                .stand
+                .zip(step.from)
+                .is_some_and(|(stand, from)| stand.avoid.is_crossed(from.speed_rpm, step.to.speed_rpm));
             let (is_repeated, response) = match trip.reaction {
+                Reaction::SmallerSteps if crosses => (
+                    false,
+                    "the step is skipped, because smaller steps would stop within the speeds to avoid",
+                ),
                 Reaction::SmallerSteps if !repeats && before.is_some() => {
                     (true, "the step is repeated in smaller steps")
                 }
@@ -277,6 +288,16 @@ impl Run<'_, '_> {
             }
             repeats = true;
         }
+    }
+
+    /// Ends the run instead of setting a target within the speeds to avoid, wherever the step comes from.
+    fn refuse_avoided(&self, step: &PlanStep) -> Result<(), Halt> {
+        let refused = self.protection.stand.and_then(|stand| stand.avoid.refusing(step.to.speed_rpm));
+        let Some(range) = refused else { return Ok(()) };
+        let (from_krpm, to_krpm) = (range.from_rpm / 1e3, range.to_rpm / 1e3);
+        let reason = format!("the step to {} would stay within {from_krpm} to {to_krpm} krpm", step.to);
+        let (guard, reaction) = (GuardName::AvoidedSpeed, Reaction::Safe);
+        Err(Halt::Tripped(Trip { t_s: self.now_s, guard, reaction, reason }, None))
     }
 
     /// Returns to `before`, then approaches `to` in stages.

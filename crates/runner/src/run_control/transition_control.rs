@@ -5,8 +5,8 @@
 //! the shaft is above the higher target.
 
 use mapper_core::{
-    Channel, OperatingPoint, PlanStep, Ramp, Ramps, RigActuators, RigMode, SampleBatch, Setpoints,
-    is_commanded_jump,
+    AvoidedSpeeds, Channel, OperatingPoint, PlanStep, Ramp, Ramps, RigActuators, RigMode, SampleBatch,
+    Setpoints, is_commanded_jump,
 };
 use std::collections::VecDeque;
 
@@ -19,6 +19,8 @@ pub struct StandMotion {
     pub overshoot_ratio: f64,
     /// Highest shaft speed, rpm.
     pub speed_max_rpm: f64,
+    /// Speeds at which the shaft must not stay.
+    pub avoid: AvoidedSpeeds,
 }
 
 /// Time constant of a shaft for ramps without a plan, s. Judgement: turbochargers of passenger cars take half a second to two.
@@ -359,8 +361,12 @@ mod tests {
         }
     }
 
-    const FAST: StandMotion =
-        StandMotion { actuators: RigActuators::FAST_VALVE, overshoot_ratio: 0.02, speed_max_rpm: 170e3 };
+    const FAST: StandMotion = StandMotion {
+        actuators: RigActuators::FAST_VALVE,
+        overshoot_ratio: 0.02,
+        speed_max_rpm: 170e3,
+        avoid: AvoidedSpeeds::NONE,
+    };
 
     /// Readings of a tenth of a second.
     fn batch(t_s: f64, p3_pa: f64, speed_rpm: f64) -> SampleBatch {

@@ -9,7 +9,7 @@ use crate::{Session, SessionError};
 use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, Concern};
 use mapper_core::{
-    Advice, CampaignChange, Dwell, Method, OperatingPoint, Plan, PlanStep, Soak, StepKind,
+    Advice, CampaignChange, Dwell, Method, OperatingPoint, Plan, PlanRemark, PlanStep, Soak, StepKind,
     UndeclaredForecast, VerdictForecast, WindowRule,
 };
 use mapper_identify::{MAX_PRIOR_SENSITIVITY_ETA, ZeroSettings};
@@ -18,7 +18,7 @@ use mapper_physics::laws::housing::{StandstillState, relax};
 use mapper_physics::laws::thermocouple::time_constant_s;
 use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, max_steps};
-use mapper_report::guard_trip_text;
+use mapper_report::{Message, guard_trip_text};
 
 /// Assumed temperature difference between cold housings and test cell, K. The zero uses the same value to find the limit that Tc relaxes to.
 const WARM_K: f64 = 3.0;
@@ -50,6 +50,8 @@ pub struct CampaignForecast {
     pub concerns: Vec<Concern>,
     /// Expected verdicts of the points; `None` for a script and for methods other than `joint`.
     pub verdicts: Option<VerdictForecast>,
+    /// The slowest crossing of the speeds to avoid.
+    pub avoided: Option<PlanRemark>,
     /// Changes after which more points are expected to be good, the cheapest first.
     pub advice: Vec<Advice>,
 }
@@ -78,6 +80,7 @@ impl Session<'_> {
             required_error_concern(campaign, &plan),
             self.guard_concern(campaign, model, &plan)?,
             information_concern(campaign, &plan),
+            avoided_concern(&plan),
         ];
         let calibrations = calibration_concerns(campaign, model, day);
         let verdicts = forecast_verdicts(campaign, &plan);
@@ -102,6 +105,7 @@ impl Session<'_> {
             duration_s: soak_s(campaign) + duration_s,
             concerns: calibrations.into_iter().chain(concerns.into_iter().flatten()).collect(),
             verdicts,
+            avoided: plan.avoided_crossing(),
             advice,
         })
     }
@@ -249,6 +253,15 @@ fn settling_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
         ),
         "lengthen `timing.dwell`, or widen `identification.stabilisation`".to_owned(),
     ))
+}
+
+/// A jump of a script that crosses the speeds to avoid too slowly; the planner makes no such jump.
+fn avoided_concern(plan: &Plan) -> Option<Concern> {
+    let remark = plan.avoided_crossing()?;
+    let PlanRemark::AvoidedCrossing { inside_s, longest_s, .. } = remark else { return None };
+    let remedy = "jump from a point that is further away, or raise `longest` if the machine allows it";
+    let concern = || Concern::warning(&["limits", "avoid"], remark.message(), remedy.to_owned());
+    (inside_s > longest_s).then(concern)
 }
 
 /// Steps with too little information on alpha_A, probe and heating/cooling ratio for any point with verdict good.

@@ -49,6 +49,7 @@ pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
 pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, SessionError> {
     let mut plan = make_plan(request)?;
     plan.remarks.extend(zero_remark(campaign));
+    plan.remarks.extend(plan.avoided_crossing());
     add_surge_search(campaign, request.model, &mut plan);
     Ok(plan)
 }
@@ -364,6 +365,10 @@ fn step_violation(place: usize, step: &PlanStep, campaign: &Campaign) -> Option<
             let value = if value.abs() < 1e15 { format!("{value}") } else { format!("{value:e}") };
             return Some(format!("has {what} = {value}{unit}, outside {low} to {high}{unit}"));
         }
+    }
+    if let Some(range) = limits.avoid.refusing(step.to.speed_rpm) {
+        let (from_krpm, to_krpm) = (range.from_rpm / 1e3, range.to_rpm / 1e3);
+        return Some(format!("stays within the speeds to avoid, {from_krpm} to {to_krpm} krpm"));
     }
     let from = step.from.is_some_and(|from| {
         !(0.0..=limits.speed_max_rpm * (1.0 + ROUNDING_RATIO)).contains(&from.speed_rpm)

@@ -63,6 +63,7 @@ pub fn rehearse(
     if plan.steps.is_empty() {
         return Err(SessionError::NoSteps(source.path.clone()));
     }
+    plan.remarks.extend(plan.avoided_crossing());
     add_surge_search(campaign, model, &mut plan);
     Ok(Rehearsal { plan, notes: steps.notes })
 }

@@ -84,6 +84,7 @@ pub fn drive_paced(
             actuators: campaign.rig_actuators(),
             overshoot_ratio: campaign.limits.overshoot_ratio(),
             speed_max_rpm: campaign.limits.speed_max_rpm,
+            avoid: campaign.limits.avoid,
         }),
         accepts: rig.accepts,
         speed: campaign.guard_set().speed.filter(|_| rig.controls),

@@ -4,8 +4,8 @@ use crate::SessionError;
 use mapper_campaign::{Campaign, DEFAULT_MAX_AGE_S};
 use mapper_core::{Channel, GuardName, RigDescription};
 use mapper_runner::{
-    BatchWatch, Guard, REQUIRED_CHANNELS, RigWatch, SignalWatch, SilenceWatch, StartCheck, SurgeWatch,
-    UnguardedChannel,
+    AvoidedSpeedWatch, BatchWatch, Guard, REQUIRED_CHANNELS, RigWatch, SignalWatch, SilenceWatch, StartCheck,
+    SurgeWatch, UnguardedChannel,
 };
 
 /// Makes the guards for a run of this campaign on this rig. A default guard is omitted if the rig does not deliver its signal. Declared and
@@ -23,6 +23,9 @@ pub fn make_guards(
         if required || rig.channels.contains(&spec.channel) {
             guards.push(Box::new(SignalWatch::new(spec)));
         }
+    }
+    if !campaign.limits.avoid.is_empty() {
+        guards.push(Box::new(AvoidedSpeedWatch::new(campaign.limits.avoid)));
     }
     guards.extend(set.surge.map(|spec| Box::new(SurgeWatch::new(spec)) as Box<dyn Guard>));
     if rig.controls {

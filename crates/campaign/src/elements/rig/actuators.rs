@@ -160,6 +160,7 @@ mod tests {
         surge_margin_min_ratio: None,
         housing_gradient_max_k: None,
         overshoot_max_ratio: None,
+        avoid: mapper_core::AvoidedSpeeds::NONE,
     };
 
     fn read(text: &str, limits: &Limits) -> RigActuators {

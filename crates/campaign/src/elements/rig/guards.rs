@@ -317,6 +317,7 @@ mod tests {
             surge_margin_min_ratio: None,
             housing_gradient_max_k: None,
             overshoot_max_ratio: None,
+            avoid: mapper_core::AvoidedSpeeds::NONE,
         };
         let by =
             GuardInputs { limits: &limits, sensors: &BTreeMap::new(), dwell_s: 120.0, speed_is_held: true };

@@ -3,7 +3,7 @@
 use crate::checking::Check;
 use crate::si_values::value_or;
 use crate::units::{Duration, Fraction, Kind, Pressure, Quantity, Speed, Temperature, TemperatureDifference};
-use mapper_core::Limits;
+use mapper_core::{AvoidedRange, AvoidedSpeeds, Limits};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::reach::FollowOutlet;
 use mapper_yaml::{FindingKind, steps};
@@ -71,7 +71,7 @@ impl BoundaryFile {
 }
 
 /// Limits that the run must never exceed.
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LimitsFile {
     /// Highest shaft speed.
@@ -94,6 +94,35 @@ pub(crate) struct LimitsFile {
     /// Largest overshoot of the shaft speed in a jump, relative to the higher of its two targets; 2 % if none is given.
     #[schemars(extend("x-above" = "0 %", "x-max" = "20 %"), example = &"2 %")]
     overshoot: Option<Quantity<Fraction>>,
+    /// Shaft speeds that a jump crosses and no step holds: critical speeds, resonances of blades.
+    #[serde(default)]
+    #[schemars(length(max = 8), extend("examples" = [[{"from": "88 krpm", "to": "92 krpm"}]]))]
+    avoid: Vec<AvoidedRangeFile>,
+}
+
+/// A range of shaft speeds that no step holds.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct AvoidedRangeFile {
+    /// Lowest speed inside.
+    #[schemars(extend("x-above" = "0 rpm", "x-max" = "1000 krpm"), example = &"88 krpm")]
+    from: Quantity<Speed>,
+    /// Highest speed inside.
+    #[schemars(extend("x-above" = "0 rpm", "x-max" = "1000 krpm"), example = &"92 krpm")]
+    to: Quantity<Speed>,
+    /// Longest time inside in a jump; 3 s if none is given. A jump that takes longer is not allowed.
+    #[schemars(extend("x-min" = "0.1 s", "x-max" = "10 min"), example = &"3 s")]
+    longest: Option<Quantity<Duration>>,
+}
+
+impl From<&AvoidedRangeFile> for AvoidedRange {
+    fn from(file: &AvoidedRangeFile) -> Self {
+        AvoidedRange {
+            from_rpm: file.from.value,
+            to_rpm: file.to.value,
+            longest_s: value_or(file.longest, AvoidedRange::LONGEST_S),
+        }
+    }
 }
 
 /// Lowest and highest pressure.
@@ -111,8 +140,8 @@ pub(crate) struct PressureRangeFile {
     stroke: Option<Quantity<Duration>>,
 }
 
-impl From<LimitsFile> for Limits {
-    fn from(file: LimitsFile) -> Self {
+impl From<&LimitsFile> for Limits {
+    fn from(file: &LimitsFile) -> Self {
         let p3 = file.turbine_inlet_pressure;
         Limits {
             speed_max_rpm: file.speed.value,
@@ -124,6 +153,7 @@ impl From<LimitsFile> for Limits {
             surge_margin_min_ratio: file.surge_margin.map(|limit| limit.value),
             housing_gradient_max_k: file.housing_gradient.map(|limit| limit.value),
             overshoot_max_ratio: file.overshoot.map(|limit| limit.value),
+            avoid: file.avoid.iter().map(AvoidedRange::from).collect::<Vec<_>>().into(),
         }
     }
 }
@@ -159,6 +189,46 @@ pub(crate) fn check(check: &mut Check<'_>) {
         let message = format!("`{setpoint}` is above `limits.turbine_inlet_temperature`, `{limit}`");
         check.note(FindingKind::Conflict, &setpoint_path, message, "lower it, or raise the limit");
     }
+    check_avoided(check);
+}
+
+/// Checks that the speeds to avoid are ranges below the limit of speed, and do not overlap.
+fn check_avoided(check: &mut Check<'_>) {
+    let limit = check.quantity(Kind::Speed, &steps!["limits", "speed"]);
+    let mut before: Vec<(f64, f64)> = Vec::new();
+    for index in 0..check.count(&steps!["limits", "avoid"]) {
+        let path = |key: &'static str| steps!["limits", "avoid", index, key];
+        let ends = check.quantity(Kind::Speed, &path("from")).zip(check.quantity(Kind::Speed, &path("to")));
+        let Some(((from_rpm, from), (to_rpm, to))) = ends else { continue };
+        let (message, remedy) = if from_rpm >= to_rpm {
+            (format!("`{to}` is not above `from`, `{from}`"), "`to` must be above `from`; exchange the two")
+        } else if let Some((_, limit)) = limit.filter(|(limit_rpm, _)| to_rpm > *limit_rpm) {
+            let message = format!("`{to}` is above `limits.speed`, `{limit}`");
+            (message, "end the range at the limit, or remove it: the shaft never goes there")
+        } else if let Some((low_rpm, high_rpm)) =
+            before.iter().find(|(low_rpm, high_rpm)| from_rpm <= *high_rpm && to_rpm >= *low_rpm)
+        {
+            let (low, high) = (low_rpm / 1e3, high_rpm / 1e3);
+            let message = format!("{from} to {to} overlaps the range {low} to {high} krpm");
+            (message, "write the two as one range")
+        } else {
+            before.push((from_rpm, to_rpm));
+            continue;
+        };
+        check.note(FindingKind::Conflict, &path("to"), message, remedy);
+    }
+}
+
+/// The limits as far as they can be read, for the speeds to avoid alone: what contradicts a step's speed.
+pub(crate) fn avoided(check: &Check<'_>, rpm: f64) -> Option<(AvoidedRange, Vec<f64>)> {
+    let speed = |path: &[mapper_yaml::Step]| Some(check.quantity(Kind::Speed, path)?.0);
+    let ranges = (0..check.count(&steps!["limits", "avoid"])).filter_map(|index| {
+        let from_rpm = speed(&steps!["limits", "avoid", index, "from"])?;
+        let to_rpm = speed(&steps!["limits", "avoid", index, "to"])?;
+        Some(AvoidedRange { from_rpm, to_rpm, longest_s: AvoidedRange::LONGEST_S })
+    });
+    let limit_rpm = speed(&steps!["limits", "speed"]).unwrap_or(f64::INFINITY);
+    AvoidedSpeeds::from(ranges.collect::<Vec<_>>()).at(rpm, limit_rpm)
 }
 
 #[cfg(test)]
@@ -167,8 +237,8 @@ mod tests {
 
     #[test]
     fn every_key_lands_in_its_own_field() {
-        let text = "{speed: 180 krpm, turbine_inlet_pressure: {min: 110 kPa, max: 4 bar, stroke: 10 s}, turbine_inlet_temperature: 600 degC, compressor_outlet_temperature: 200 degC, surge_margin: -5 %, housing_gradient: 30 K, overshoot: 3 %}";
-        let limits = Limits::from(crate::testing::any::<LimitsFile>(text).unwrap());
+        let text = "{speed: 180 krpm, turbine_inlet_pressure: {min: 110 kPa, max: 4 bar, stroke: 10 s}, turbine_inlet_temperature: 600 degC, compressor_outlet_temperature: 200 degC, surge_margin: -5 %, housing_gradient: 30 K, overshoot: 3 %, avoid: [{from: 88 krpm, to: 92 krpm}, {from: 40 krpm, to: 41 krpm, longest: 5 s}]}";
+        let limits = Limits::from(&crate::testing::any::<LimitsFile>(text).unwrap());
         let near =
             |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-9 * expected.abs();
         assert!(near(Some(limits.speed_max_rpm), 180e3) && near(limits.p3_stroke_s, 10.0));
@@ -176,6 +246,9 @@ mod tests {
         assert!(near(limits.t3_max_k, 873.15) && near(limits.t2_max_k, 473.15));
         assert!(near(limits.surge_margin_min_ratio, -0.05) && near(limits.housing_gradient_max_k, 30.0));
         assert!(near(limits.overshoot_max_ratio, 0.03));
+        let range = |from_rpm, to_rpm, longest_s| AvoidedRange { from_rpm, to_rpm, longest_s };
+        let avoid: Vec<_> = limits.avoid.iter().collect();
+        assert_eq!(avoid, [range(88e3, 92e3, AvoidedRange::LONGEST_S), range(40e3, 41e3, 5.0)]);
         assert!(near(limits.p3_slew_max_pa_s(), 29e3), "290 kPa in 10 s");
     }
 }

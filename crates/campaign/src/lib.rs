@@ -6,6 +6,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod actuator_lines;
 pub mod campaign;
 mod checking;
 mod checks;
@@ -19,6 +20,7 @@ mod si_values;
 mod testing;
 
 pub use crate::elements::turbocharger::machine::{NominalTableError, nominal_table};
+pub use actuator_lines::{ActuatorValue, actuator_lines, with_actuators};
 pub use campaign::Campaign;
 pub use checks::calibration::{CalibrationWarning, forecast_calibration_warnings};
 pub use checks::map_misfit::{MapMisfit, find_map_misfit};

@@ -3,6 +3,8 @@
 use crate::command_line::subcommands;
 use crate::output::failure::Failure;
 
+mod commission;
+
 subcommands! { Command:
     init::Init,
     check::Check,

@@ -1,5 +1,6 @@
 //! `mapper rig`.
 
+use crate::commands::commission::Commission;
 use crate::environment::rig_states_directory;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
@@ -7,7 +8,7 @@ use clap::{Args, Subcommand};
 use mapper_session::{RigStates, RigStatus, since_text};
 use std::path::PathBuf;
 
-/// Show the lock and the lockout of a rig, and acknowledge that it is safe to run again
+/// Measure how a stand moves; show the lock and the lockout of a rig, and acknowledge that it is safe to run again
 #[derive(Debug, Args)]
 pub struct Rig {
     #[command(subcommand)]
@@ -22,6 +23,7 @@ pub struct Rig {
 
 #[derive(Debug, Subcommand)]
 enum RigCommand {
+    Commission(Commission),
     /// Show the owner and the lockout of a rig, or of all rigs used so far
     Status {
         /// Name of the rig, as reported by its backend
@@ -38,6 +40,7 @@ impl Rig {
     pub fn run(&self) -> Result<(), Failure> {
         let states = RigStates::new(&rig_states_directory(self.states.as_deref()));
         let (status, cleared) = match &self.command {
+            RigCommand::Commission(commission) => return commission.run(self.states.as_deref(), self.json),
             RigCommand::Status { rig: None } => return self.print_all(&states.list()),
             RigCommand::Status { rig: Some(rig) } => (states.status(rig)?, false),
             RigCommand::Acknowledge { rig } => (states.acknowledge(rig)?, true),

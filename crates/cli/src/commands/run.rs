@@ -67,7 +67,7 @@ pub struct Run {
     pub json: bool,
 }
 
-fn parse_pace(text: &str) -> Result<f64, String> {
+pub(crate) fn parse_pace(text: &str) -> Result<f64, String> {
     let pace = text.parse().ok().filter(|pace: &f64| pace.is_finite() && *pace > 0.0);
     pace.ok_or_else(|| "write a number above 0: 1 is real time, 10 ten times as fast".to_owned())
 }
@@ -160,7 +160,6 @@ impl Run {
             results.identified.points_alone().all(|point| point.verdict == Verdict::Unusable)
         });
         let unwritten = results.as_ref().ok().and_then(|results| results.unwritten.clone());
-        const KEPT: &str = "the rig is safe and the recording is kept";
         let failure = match end {
             Ok(RunEnding::Completed) if unwritten.is_some() => {
                 let unwritten = unwritten.unwrap_or_default();
@@ -171,19 +170,7 @@ impl Run {
                 Code::BadRecording,
                 "no point is usable; the reasons are listed above and in the report",
             )),
-            Ok(RunEnding::Completed) => None,
-            Ok(RunEnding::Drifted { reason }) => {
-                Some(Failure::new(Code::Rig, format!("{reason}. The rig is safe and the recording is kept")))
-            }
-            Ok(RunEnding::Interrupted { t_s }) => Some(Failure::new(
-                Code::Interrupted,
-                format!("stopped by the operator at {t_s:.0} s; {KEPT}"),
-            )),
-            Ok(RunEnding::Tripped(Trip { t_s, reason, .. })) => {
-                Some(Failure::new(Code::Rig, format!("stopped at {t_s:.1} s: {reason}; {KEPT}")))
-            }
-            // The runner reports a failure as an error; this is one that a file remembers.
-            Ok(RunEnding::Failed { reason }) => Some(Failure::new(Code::Rig, format!("{reason}; {KEPT}"))),
+            Ok(ending) => ending_failure(&ending),
             Err(source) => {
                 let recording = recording.clone();
                 Some(SessionError::Run { source, recording }.into())
@@ -248,8 +235,27 @@ impl Run {
     }
 }
 
+/// The failure of a run that did not complete.
+pub(crate) fn ending_failure(ending: &RunEnding) -> Option<Failure> {
+    const KEPT: &str = "the rig is safe and the recording is kept";
+    Some(match ending {
+        RunEnding::Completed => return None,
+        RunEnding::Drifted { reason } => {
+            Failure::new(Code::Rig, format!("{reason}. The rig is safe and the recording is kept"))
+        }
+        RunEnding::Interrupted { t_s } => {
+            Failure::new(Code::Interrupted, format!("stopped by the operator at {t_s:.0} s; {KEPT}"))
+        }
+        RunEnding::Tripped(Trip { t_s, reason, .. }) => {
+            Failure::new(Code::Rig, format!("stopped at {t_s:.1} s: {reason}; {KEPT}"))
+        }
+        // The runner reports a failure as an error; this is one that a file remembers.
+        RunEnding::Failed { reason } => Failure::new(Code::Rig, format!("{reason}; {KEPT}")),
+    })
+}
+
 /// A directory of a campaign, with `~` as in a shell.
-fn expand_home(directory: &str) -> PathBuf {
+pub(crate) fn expand_home(directory: &str) -> PathBuf {
     let home = std::env::var_os("HOME").filter(|home| !home.is_empty());
     match (directory.strip_prefix("~/"), home) {
         (Some(rest), Some(home)) => PathBuf::from(home).join(rest),

@@ -92,39 +92,52 @@ pub struct LaggedCommand {
     pub valve: Response,
 }
 
-/// An actuator's motion from level to level.
+/// An actuator's motion from command to command.
 #[derive(Debug, Clone, PartialEq)]
-struct Path {
-    /// The command that the drive follows in each level.
+pub(crate) struct Path {
+    response: Response,
+    /// Time of each command, s.
+    times_s: Vec<f64>,
+    /// The command that the drive follows from then on.
     commands: Vec<f64>,
     /// Positions of drive and output at the start of each level.
     starts: Vec<(f64, f64)>,
 }
 
 impl Path {
-    /// The motion of an actuator that came from `before` and is at rest at the first level.
-    fn new(levels: &[Level], value: fn(&Level) -> f64, response: Response, before: f64) -> Path {
-        let mut path = Path { commands: Vec::new(), starts: Vec::with_capacity(levels.len()) };
-        for (index, level) in levels.iter().enumerate() {
-            let command = value(level);
-            let Some(last) = index.checked_sub(1) else {
-                path.starts.push((command, response.output(before, command)));
-                path.commands.push(command);
-                continue;
-            };
-            path.starts.push(path.at(last, response, level.start_s - levels[last].start_s));
-            let held = path.commands[last];
-            path.commands.push(if (command - held).abs() < response.dead_band { held } else { command });
+    /// The motion of an actuator that came from `before` and is at rest at the first of these commands, times in s and values.
+    pub(crate) fn new(
+        commands: impl IntoIterator<Item = (f64, f64)>,
+        response: Response,
+        before: f64,
+    ) -> Path {
+        let (times_s, starts) = (Vec::new(), Vec::new());
+        let mut path = Path { response, times_s, commands: Vec::new(), starts };
+        for (t_s, command) in commands {
+            let held = path.commands.last().copied();
+            path.starts.push(match held {
+                Some(_) => path.at(path.commands.len() - 1, t_s),
+                None => (command, response.output(before, command)),
+            });
+            let is_held = held.filter(|held| (command - held).abs() < response.dead_band);
+            path.commands.push(is_held.unwrap_or(command));
+            path.times_s.push(t_s);
         }
         path
     }
 
-    /// Positions of drive and output in a level, `elapsed_s` after its start. The drive moves in one direction, so that the output depends on its
-    /// start alone.
-    fn at(&self, level: usize, response: Response, elapsed_s: f64) -> (f64, f64) {
-        let (drive, output) = self.starts[level];
-        let drive = response.approach(drive, self.commands[level], elapsed_s);
-        (drive, response.output(output, drive))
+    /// Positions of drive and output after a command, at a time without the dead time. The drive moves in one direction, so that the output depends
+    /// on its start alone.
+    fn at(&self, index: usize, t_s: f64) -> (f64, f64) {
+        let (drive, output) = self.starts[index];
+        let drive = self.response.approach(drive, self.commands[index], t_s - self.times_s[index]);
+        (drive, self.response.output(output, drive))
+    }
+
+    /// Output at `t_s`; there is at least one command.
+    pub(crate) fn output(&self, t_s: f64) -> f64 {
+        let t_s = t_s - self.response.dead_time_s;
+        self.at(self.times_s.partition_point(|start_s| *start_s <= t_s).saturating_sub(1), t_s).1
     }
 }
 
@@ -135,8 +148,9 @@ impl LaggedCommand {
     /// The response to `levels` (rising in time, at least one) from steady state.
     pub fn new(levels: Vec<Level>, p3: Response, valve: Response) -> Self {
         let first_pa = levels.first().map_or(f64::NAN, |level| level.p3_pa);
-        let p3_path = Path::new(&levels, |level| level.p3_pa, p3, first_pa);
-        let valve_path = Path::new(&levels, |level| level.valve_opening_ratio, valve, SAFE_OPENING);
+        let p3_path = Path::new(levels.iter().map(|level| (level.start_s, level.p3_pa)), p3, first_pa);
+        let openings = levels.iter().map(|level| (level.start_s, level.valve_opening_ratio));
+        let valve_path = Path::new(openings, valve, SAFE_OPENING);
         LaggedCommand { levels, p3_path, valve_path, p3, valve }
     }
 
@@ -164,21 +178,14 @@ impl LaggedCommand {
         self.levels.partition_point(|level| level.start_s <= t_s).saturating_sub(1)
     }
 
-    /// Output of an actuator at `t_s`.
-    fn output(&self, path: &Path, response: Response, t_s: f64) -> f64 {
-        let t_s = t_s - response.dead_time_s;
-        let level = self.level(t_s);
-        path.at(level, response, t_s - self.levels[level].start_s).1
-    }
-
     /// P3 at `t_s`, Pa.
     pub fn p3_pa(&self, t_s: f64) -> f64 {
-        self.output(&self.p3_path, self.p3, t_s)
+        self.p3_path.output(t_s)
     }
 
     /// Valve opening at `t_s`.
     pub fn valve_opening_ratio(&self, t_s: f64) -> f64 {
-        self.output(&self.valve_path, self.valve, t_s)
+        self.valve_path.output(t_s)
     }
 
     /// Time after which a jump of P3 is almost complete, s.
@@ -269,13 +276,29 @@ const DEAD_TIME_FACTOR: f64 = 2.0;
 const DEAD_TIME_TOLERANCE: f64 = 3e-3;
 /// Factor by which a dead time may shorten the lag that stood for both. Bound: a lag far below the dead time does not show.
 const LAG_FACTOR: f64 = 20.0;
+/// How closely a response is sought.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Search {
+    /// Time before and after a jump over which a response is compared, s.
+    pub(crate) around_s: (f64, f64),
+    /// Reduction of the cost above which a rate limit or a dead time is accepted.
+    pub(crate) min_cost_reduction: f64,
+    /// Rates of the coarse search, in median jumps per second.
+    pub(crate) rates: &'static [f64],
+}
+
+impl Search {
+    /// In the recording of a campaign.
+    const IN_CAMPAIGN: Search =
+        Search { around_s: AROUND_S, min_cost_reduction: MIN_COST_REDUCTION, rates: &RATES };
+}
+
 /// Reduction of the sum of squared residuals, relative to their mean square, above which a rate limit or a dead time is accepted. Bound: ten
 /// standard deviations of white noise, five of coloured noise over the half second of a ramp. A wrongly accepted one has no effect, because a
 /// fast rate or a short dead time is equivalent to a lag alone.
 const MIN_COST_REDUCTION: f64 = 100.0;
-/// Reduction by the best of [`RATES`] above which a fine search follows. Bound: half of the distance between two rates loses less than 90
-/// % of the reduction.
-const MIN_COARSE_REDUCTION: f64 = 0.1 * MIN_COST_REDUCTION;
+/// Share of it by the best of [`RATES`] above which a fine search follows. Bound: half of the distance between two rates loses less than 90 % of the reduction.
+const COARSE_SHARE: f64 = 0.1;
 
 /// Response of the measured P3 to its command, with a rate limit if the recording supports one; `None` without jumps or P3.
 pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f64) -> Option<Response> {
@@ -283,10 +306,31 @@ pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f
     let jumps = p3_jumps(recording, noise_sigma);
     let sizes = recording.steps.windows(2).map(|pair| (pair[1].p3_pa - pair[0].p3_pa).abs());
     let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
-    estimate_response(table, values, &jumps, sizes.collect(), |response| {
+    estimate_response(table, values, &jumps, (sizes.collect(), Search::IN_CAMPAIGN), |response| {
         let command = commanded.with_responses(response, Response::lag(0.0));
         move |t_s| command.p3_pa(t_s)
     })
+}
+
+/// Area of the valve at each sample from flow and pressures, m2; `None` without flow, P2 or T2.
+pub(crate) fn valve_areas_m2(
+    table: &Table,
+    (nominal_p1_pa, outlet_volume_m3): (f64, f64),
+) -> Option<Vec<f64>> {
+    let flow = table.column(Channel::CompressorFlow)?;
+    let (p2, t2) = (table.column(Channel::P2)?, table.column(Channel::T2)?);
+    let p1 = table.column(Channel::P1);
+    let p2_slope_pa_s = |i: usize| {
+        let (before, after) = (i.saturating_sub(1), (i + 1).min(table.t_s.len() - 1));
+        let span_s = table.t_s[after] - table.t_s[before];
+        if span_s > 0.0 { (p2[after] - p2[before]) / span_s } else { 0.0 }
+    };
+    let area_m2 = (0..table.t_s.len()).map(|i| {
+        let p1_pa = p1.map_or(nominal_p1_pa, |p1| p1[i]);
+        let filling_kg_s = outlet_volume_m3 * p2_slope_pa_s(i) / (Gas::AIR_GAS_CONSTANT_J_KGK * t2[i]);
+        (flow[i] - filling_kg_s) / orifice::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(MIN_FLUX)
+    });
+    Some(area_m2.collect())
 }
 
 /// Response of the valve to its command, from flow and pressures: orifice flow is proportional to its area, and the volume before it takes a part
@@ -298,21 +342,7 @@ pub fn measured_valve_response(
     (nominal_p1_pa, outlet_volume_m3): (f64, f64),
     declared: Response,
 ) -> Option<Response> {
-    let flow = table.column(Channel::CompressorFlow)?;
-    let (p2, t2) = (table.column(Channel::P2)?, table.column(Channel::T2)?);
-    let p1 = table.column(Channel::P1);
-    let p2_slope_pa_s = |i: usize| {
-        let (before, after) = (i.saturating_sub(1), (i + 1).min(table.t_s.len() - 1));
-        let span_s = table.t_s[after] - table.t_s[before];
-        if span_s > 0.0 { (p2[after] - p2[before]) / span_s } else { 0.0 }
-    };
-    let openings: Vec<f64> = (0..table.t_s.len())
-        .map(|i| {
-            let p1_pa = p1.map_or(nominal_p1_pa, |p1| p1[i]);
-            let filling_kg_s = outlet_volume_m3 * p2_slope_pa_s(i) / (Gas::AIR_GAS_CONSTANT_J_KGK * t2[i]);
-            (flow[i] - filling_kg_s) / orifice::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(MIN_FLUX)
-        })
-        .collect();
+    let openings = valve_areas_m2(table, (nominal_p1_pa, outlet_volume_m3))?;
     let openings_of = |pair: &[StepMarker]| (pair[0].valve_opening_ratio, pair[1].valve_opening_ratio);
     let jumping = || {
         let jumped = |(from, to): (f64, f64)| is_jump(Channel::ValveCommand, from, to);
@@ -341,9 +371,9 @@ pub fn measured_valve_response(
     let with_declared = |response: Response| {
         predict(Response { play: declared.play, dead_band: declared.dead_band, ..response })
     };
-    let found = estimate_response(table, &openings, &jumps, sizes, with_declared)?;
+    let found = estimate_response(table, &openings, &jumps, (sizes, Search::IN_CAMPAIGN), with_declared)?;
     let found = Response { play: declared.play, dead_band: declared.dead_band, ..found };
-    let cost_of = |response: Response| sum_of_squares(table, &openings, &jumps, predict(response));
+    let cost_of = |response: Response| sum_of_squares(table, &openings, &jumps, AROUND_S, predict(response));
     // The play that the recording shows is the diagnosis' to name, but without it the lag would be longer.
     let with_play = |more: f64| {
         let with = |ln_lag: f64| Response { lag_s: ln_lag.exp(), play: declared.play + more, ..found };
@@ -353,7 +383,7 @@ pub fn measured_valve_response(
     };
     let best = UNDECLARED_PLAYS.map(with_play).into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     let without = cost_of(found);
-    let samples = samples_around(table, &jumps);
+    let samples = samples_around(table, &jumps, AROUND_S);
     let shown = best.filter(|(cost, _)| without - cost > MIN_COST_REDUCTION * cost / samples);
     Some(Response { lag_s: shown.map_or(found.lag_s, |(_, lag_s)| lag_s), ..found })
 }
@@ -372,10 +402,16 @@ fn p3_jumps(recording: &Recording, noise_sigma: f64) -> Vec<f64> {
 const AROUND_S: (f64, f64) = (3.0, 12.0);
 
 /// Sum of squared residuals around each jump, with a free level.
-fn sum_of_squares(table: &Table, values: &[f64], jumps: &[f64], predicted: impl Fn(f64) -> f64) -> f64 {
+fn sum_of_squares(
+    table: &Table,
+    values: &[f64],
+    jumps: &[f64],
+    around_s: (f64, f64),
+    predicted: impl Fn(f64) -> f64,
+) -> f64 {
     let mut total = 0.0;
     for jump_s in jumps {
-        let range = table.range(jump_s - AROUND_S.0, jump_s + AROUND_S.1);
+        let range = table.range(jump_s - around_s.0, jump_s + around_s.1);
         let residuals: Vec<f64> =
             range.filter(|i| values[*i].is_finite()).map(|i| values[i] - predicted(table.t_s[i])).collect();
         let mean = mean(&residuals).unwrap_or(0.0);
@@ -385,8 +421,8 @@ fn sum_of_squares(table: &Table, values: &[f64], jumps: &[f64], predicted: impl 
 }
 
 /// Number of samples that [`sum_of_squares`] compares.
-fn samples_around(table: &Table, jumps: &[f64]) -> f64 {
-    let around = |jump_s: &f64| table.range(jump_s - AROUND_S.0, jump_s + AROUND_S.1).len();
+fn samples_around(table: &Table, jumps: &[f64], around_s: (f64, f64)) -> f64 {
+    let around = |jump_s: &f64| table.range(jump_s - around_s.0, jump_s + around_s.1).len();
     jumps.iter().map(around).sum::<usize>().max(1) as f64
 }
 
@@ -408,20 +444,21 @@ fn minimise_globally((low, high): (f64, f64), tolerance: f64, cost: impl Fn(f64)
 }
 
 /// Estimates the response with the least squared residuals around the jumps, whose median size is that of `sizes`.
-fn estimate_response<Prediction: Fn(f64) -> f64>(
+pub(crate) fn estimate_response<Prediction: Fn(f64) -> f64>(
     table: &Table,
     values: &[f64],
     jumps: &[f64],
-    sizes: Vec<f64>,
+    (sizes, search): (Vec<f64>, Search),
     predict: impl Fn(Response) -> Prediction,
 ) -> Option<Response> {
     let size = median(&sizes).filter(|size| *size > 0.0)?;
     if jumps.is_empty() {
         return None;
     }
-    let samples = samples_around(table, jumps);
+    let samples = samples_around(table, jumps, search.around_s);
     let estimate = Estimate {
-        cost_of: |response| sum_of_squares(table, values, jumps, predict(response)),
+        cost_of: |response| sum_of_squares(table, values, jumps, search.around_s, predict(response)),
+        search,
         size,
         samples,
     };
@@ -434,6 +471,7 @@ fn estimate_response<Prediction: Fn(f64) -> f64>(
 /// The search for a response: each form is accepted if it reduces the cost of the one before by more than chance.
 struct Estimate<C: Fn(Response) -> f64> {
     cost_of: C,
+    search: Search,
     /// Median size of the jumps.
     size: f64,
     samples: f64,
@@ -456,17 +494,19 @@ impl<C: Fn(Response) -> f64> Estimate<C> {
     /// The same with a limited rate, if there is one.
     fn limited(&self, start: Costed) -> Costed {
         let at_rate = |slew_per_s: f64| self.at(slew_per_s, start.1.dead_time_s);
-        let coarse = RATES.iter().filter_map(|rate| at_rate(rate * self.size));
+        let coarse = self.search.rates.iter().filter_map(|rate| at_rate(rate * self.size));
         let coarse = coarse.min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((_, Response { slew_per_s, .. })) =
-            coarse.filter(|(cost, _)| self.is_better(*cost, start.0, MIN_COARSE_REDUCTION))
-        else {
+        let Some((_, Response { slew_per_s, .. })) = coarse.filter(|(cost, _)| {
+            self.is_better(*cost, start.0, COARSE_SHARE * self.search.min_cost_reduction)
+        }) else {
             return start;
         };
         let cost = |rate: f64| at_rate(rate).map_or(f64::INFINITY, |(cost, _)| cost);
         let range = (slew_per_s / RATE_FACTOR, slew_per_s * RATE_FACTOR);
         let found = minimise_globally(range, RATE_TOLERANCE, cost).and_then(at_rate);
-        found.filter(|(cost, _)| self.is_better(*cost, start.0, MIN_COST_REDUCTION)).unwrap_or(start)
+        found
+            .filter(|(cost, _)| self.is_better(*cost, start.0, self.search.min_cost_reduction))
+            .unwrap_or(start)
     }
 
     /// The best lag, at most that of `start`, with this dead time.
@@ -481,15 +521,15 @@ impl<C: Fn(Response) -> f64> Estimate<C> {
     fn late(&self, start: Costed) -> Costed {
         let at_time = |dead_time_s: f64| self.with_dead_time(dead_time_s, start.1);
         let coarse = DEAD_TIMES_S.map(at_time).into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((_, Response { dead_time_s, .. })) =
-            coarse.filter(|(cost, _)| self.is_better(*cost, start.0, MIN_COARSE_REDUCTION))
-        else {
+        let Some((_, Response { dead_time_s, .. })) = coarse.filter(|(cost, _)| {
+            self.is_better(*cost, start.0, COARSE_SHARE * self.search.min_cost_reduction)
+        }) else {
             return start;
         };
         let (low, high) = (dead_time_s / DEAD_TIME_FACTOR, dead_time_s * DEAD_TIME_FACTOR);
         let found = minimise(low, high, DEAD_TIME_TOLERANCE, |dead_time_s| at_time(dead_time_s).0);
         let late = at_time(found.at);
-        if self.is_better(late.0, start.0, MIN_COST_REDUCTION) { late } else { start }
+        if self.is_better(late.0, start.0, self.search.min_cost_reduction) { late } else { start }
     }
 }
 

@@ -14,6 +14,7 @@ use crate::rig::guards::check_guards;
 use crate::rig::observers::{EventForwarder, Recorder, StepEstimator, ThreadedObserver};
 use crate::rig::rig_state::{ADDRESS_PREFIX, RigLease, RigStates};
 use crate::rig::sources::Sources;
+use crate::run::commissioning::Commissioning;
 use crate::run::preflight::{check_room, check_setpoints};
 use crate::run::replayed_steps::drive_resumed;
 use crate::{Session, SessionError, SessionEvent};
@@ -93,6 +94,17 @@ pub struct RunOutcome {
     pub results: Result<Results, SessionError>,
 }
 
+/// A run without results. The rig is safe and the recording is kept.
+#[derive(Debug)]
+pub struct RecordedRun {
+    /// The run's directory.
+    pub directory: PathBuf,
+    /// Its recording.
+    pub recording: PathBuf,
+    /// How it ended; the error if rig or recording failed.
+    pub end: Result<RunEnding, RunError>,
+}
+
 impl RunOutcome {
     /// The end of the run in one sentence.
     pub fn sentence(&self) -> String {
@@ -155,6 +167,26 @@ impl<'s> Session<'s> {
         Ok(PreparedRun { request, model, plan, scripted, sources })
     }
 
+    /// Prepares the steps of a commissioning on the rig of the request's campaign.
+    ///
+    /// # Errors
+    /// [`SessionError`] if a guard is missing, the backend's settings are wrong or it refuses a setpoint.
+    pub fn prepare_commissioning<'a>(
+        &self,
+        commissioning: &'a Commissioning,
+        request: RunRequest<'a>,
+    ) -> Result<PreparedRun<'a>, SessionError> {
+        let model = nominal_model(request.campaign)?;
+        let sources = self.registry.make_sources(request.campaign, &model)?;
+        let rig = sources.backend.describe();
+        let mut plan = commissioning.plan.clone();
+        plan.made_from.rig_sha256 = Some(rig_sha256(&rig)?);
+        let campaign = &commissioning.campaign;
+        check_guards(campaign, &rig)?;
+        check_setpoints(&plan, &rig)?;
+        Ok(PreparedRun { request: RunRequest { campaign, ..request }, model, plan, scripted: None, sources })
+    }
+
     /// Prepares and runs.
     ///
     /// # Errors
@@ -188,20 +220,48 @@ impl PreparedRun<'_> {
     /// # Errors
     /// If the rig is not available or the run's files cannot be created. Failures during the run are part of its outcome.
     pub fn run_paced(
-        mut self,
+        self,
         session: &Session<'_>,
         clock: &mut dyn Clock,
         each_sample: bool,
     ) -> Result<RunOutcome, SessionError> {
+        if let Some(outcome) = self.finish_complete_run(session)? {
+            return Ok(outcome);
+        }
+        let (run, recorded, parts) = self.record(session, clock, each_sample)?;
+        let RecordedRun { directory, recording, end } = recorded;
+        move_earlier_results(&directory)?;
+        let executed = run.executed(&directory);
+        let results = run.results(session, executed, for_files(&end), &directory, &parts);
+        Ok(RunOutcome { directory, recording, end, results })
+    }
+
+    /// Drives the rig at the pace of a clock and records, without results.
+    ///
+    /// # Errors
+    /// As [`PreparedRun::run_paced`].
+    pub fn record_paced(
+        self,
+        session: &Session<'_>,
+        clock: &mut dyn Clock,
+        each_sample: bool,
+    ) -> Result<RecordedRun, SessionError> {
+        Ok(self.record(session, clock, each_sample)?.1)
+    }
+
+    /// Returns this run with what it recorded, and all its parts.
+    fn record(
+        mut self,
+        session: &Session<'_>,
+        clock: &mut dyn Clock,
+        each_sample: bool,
+    ) -> Result<(Self, RecordedRun, Vec<RunPart>), SessionError> {
         let campaign = self.request.campaign;
         let rig = self.rig();
         if !rig.simulated_time {
             let backend =
                 DeadlineBackend::new(self.sources.backend, DEADLINES).map_err(SessionError::Backend)?;
             self.sources.backend = Box::new(backend);
-        }
-        if let Some(outcome) = self.finish_complete_run(session)? {
-            return Ok(outcome);
         }
         let mut lease = self.acquire_lease(&rig)?;
         let (directory, plan_json) = (self.create_directory()?, json_text(&self.plan)?);
@@ -250,10 +310,7 @@ impl PreparedRun<'_> {
             finished?;
         }
         parts.push(RunPart { recording: recording.clone(), soaked: true, saved: None });
-        move_earlier_results(&directory)?;
-        let executed = self.executed(&directory);
-        let results = self.results(session, executed, for_files(&end), &directory, &parts);
-        Ok(RunOutcome { directory, recording, end, results })
+        Ok((self, RecordedRun { directory, recording, end }, parts))
     }
 
     /// Removes the files of a run whose rig was not armed, and returns the error of the run.

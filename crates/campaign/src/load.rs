@@ -215,8 +215,16 @@ fn deserialise(
     }
     let mut unreachable = unreachable(&campaign);
     report_wrong_limits(tree, notes, &mut unreachable, campaign.points.len());
-    for UnreachablePoint { point, reason, remedy, .. } in unreachable {
+    let mut speeds_to_avoid = Vec::new();
+    for UnreachablePoint { point, reason, remedy, limit } in unreachable {
         let steps = point_paths.get(point).map(Vec::as_slice).unwrap_or_default();
+        // A speed to avoid is one mistake at all its openings.
+        if limit == Some(&["avoid"]) {
+            if speeds_to_avoid.contains(&steps) {
+                continue;
+            }
+            speeds_to_avoid.push(steps);
+        }
         notes.push(tree.finding(FindingKind::Unreachable, steps, reason, remedy));
     }
     notes.is_empty().then_some(campaign)

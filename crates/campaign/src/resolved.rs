@@ -5,7 +5,7 @@ use crate::checks::reachable_points::Concern;
 use mapper_core::OperatingPoint;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::line_points::{LineRequest, Spread, line_points};
-use mapper_physics::operating_point::reach::{AVOIDED_REMEDY, Obstacle, hold_speed};
+use mapper_physics::operating_point::reach::hold_speed;
 use mapper_physics::simulation::model::Model;
 use mapper_yaml::{Step, steps};
 use serde::Serialize;
@@ -52,20 +52,6 @@ pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<
                     limit_rpm / 1e3
                 ),
                 remedy: "lower it, or raise the limit if the machine allows it".to_owned(),
-            });
-            continue;
-        }
-        let limits = &campaign.limits;
-        if let Some((range, nearest_rpm)) = limits.avoid.at(speed_rpm, limit_rpm) {
-            let obstacle = Obstacle::Avoided { range, nearest_rpm };
-            let (shown, t1_k) = (speed_rpm / 1e3, campaign.boundary.t1_k);
-            concerns.push(Concern {
-                is_error: true,
-                at: at("speed_corrected"),
-                message: format!(
-                    "{krpm} krpm corrected are {shown:.2} krpm at T1 = {t1_k:.2} K, which {obstacle}"
-                ),
-                remedy: AVOIDED_REMEDY.to_owned(),
             });
             continue;
         }

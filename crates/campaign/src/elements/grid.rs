@@ -1,11 +1,9 @@
 //! `grid:`, the operating points: by speeds and openings, by speed lines from choke to surge, or listed.
 
 use crate::checking::Check;
-use crate::elements::rig::limits::avoided;
 use crate::units::{Fraction, Kind, MassFlow, Quantity, Speed};
 use mapper_core::{Limits, OperatingPoint, ReferenceState};
 use mapper_physics::operating_point::line_points::{LineRequest, Spread};
-use mapper_physics::operating_point::reach::{AVOIDED_REMEDY, Obstacle};
 use mapper_yaml::{FindingKind, Step, steps};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -216,7 +214,7 @@ fn check_openings(check: &mut Check<'_>) {
     }
 }
 
-/// Checks `points` or `skip` for duplicates and for speeds above the limit or to avoid.
+/// Checks `points` or `skip` for duplicates and for speeds above the limit.
 fn check_points(check: &mut Check<'_>, list: &str) {
     let mut seen = HashSet::new();
     for (index, (rpm, opening)) in points(check, list) {
@@ -293,10 +291,6 @@ fn lowest_speed_rpm(check: &Check<'_>) -> f64 {
 }
 
 fn check_speed_limit(check: &mut Check<'_>, steps: &[Step], rpm: f64, text: &str) {
-    if let Some((range, nearest_rpm)) = avoided(check, rpm) {
-        let message = format!("`{text}` {}", Obstacle::Avoided { range, nearest_rpm });
-        check.note(FindingKind::Range, steps, message, AVOIDED_REMEDY);
-    }
     if let Some((limit_rpm, limit)) = check.quantity(Kind::Speed, &steps!["limits", "speed"])
         && rpm > limit_rpm
     {

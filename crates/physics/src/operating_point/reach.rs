@@ -104,12 +104,8 @@ pub enum Obstacle {
     T3 { t3_k: f64, limit_k: f64 },
 }
 
-/// The remedy for a speed that is to be avoided.
-pub const AVOIDED_REMEDY: &str =
-    "choose an allowed speed, or narrow the range if the machine allows it; no step may stay inside";
-
 /// Names the nearest allowed speeds, after "the nearest allowed".
-pub fn nearest_speeds(nearest_rpm: &[f64]) -> String {
+fn nearest_speeds(nearest_rpm: &[f64]) -> String {
     let shown = |rpm: &f64| readable(*rpm, "rpm");
     match nearest_rpm {
         [below_rpm, above_rpm] => format!("speeds are {} and {}", shown(below_rpm), shown(above_rpm)),
@@ -140,7 +136,9 @@ impl Obstacle {
             Obstacle::Speed { .. } => {
                 "choose a lower speed, or raise the limit if the machine allows it; the limits apply to scripts too"
             }
-            Obstacle::Avoided { .. } => AVOIDED_REMEDY,
+            Obstacle::Avoided { .. } => {
+                "choose an allowed speed, or narrow the range if the machine allows it; no step may stay inside"
+            }
             Obstacle::Surge { .. } => "remove the point, or open the valve further",
             Obstacle::SurgeMargin { .. } => {
                 "remove the point, open the valve further, or lower the limit if the rig allows it"

@@ -3,7 +3,7 @@
 use crate::checking::Check;
 use crate::si_values::value_or;
 use crate::units::{Duration, Fraction, Kind, Pressure, Quantity, Speed, Temperature, TemperatureDifference};
-use mapper_core::{AvoidedRange, AvoidedSpeeds, Limits};
+use mapper_core::{AvoidedRange, Limits};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::reach::FollowOutlet;
 use mapper_yaml::{FindingKind, steps};
@@ -217,18 +217,6 @@ fn check_avoided(check: &mut Check<'_>) {
         };
         check.note(FindingKind::Conflict, &path("to"), message, remedy);
     }
-}
-
-/// The limits as far as they can be read, for the speeds to avoid alone: what contradicts a step's speed.
-pub(crate) fn avoided(check: &Check<'_>, rpm: f64) -> Option<(AvoidedRange, Vec<f64>)> {
-    let speed = |path: &[mapper_yaml::Step]| Some(check.quantity(Kind::Speed, path)?.0);
-    let ranges = (0..check.count(&steps!["limits", "avoid"])).filter_map(|index| {
-        let from_rpm = speed(&steps!["limits", "avoid", index, "from"])?;
-        let to_rpm = speed(&steps!["limits", "avoid", index, "to"])?;
-        Some(AvoidedRange { from_rpm, to_rpm, longest_s: AvoidedRange::LONGEST_S })
-    });
-    let limit_rpm = speed(&steps!["limits", "speed"]).unwrap_or(f64::INFINITY);
-    AvoidedSpeeds::from(ranges.collect::<Vec<_>>()).at(rpm, limit_rpm)
 }
 
 #[cfg(test)]

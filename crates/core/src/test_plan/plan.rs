@@ -134,7 +134,7 @@ pub struct PlanInputHashes {
 }
 
 /// Summary of the plan.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PlanFigures {
     /// Sum over the jumps of the housing's temperature change within the window, K (absolute values).
     pub sum_gradient_k: f64,

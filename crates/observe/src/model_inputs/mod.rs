@@ -1,6 +1,5 @@
 //! Recorded boundary conditions as model inputs: averaged or smoothed, with actuator response and timing of commands.
 
-pub mod actuator_fit;
 pub mod averaged_inputs;
 pub mod lagged_command;
 pub mod smoothed_inputs;

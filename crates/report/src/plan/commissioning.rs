@@ -11,12 +11,16 @@ const DIGITS: usize = 3;
 
 /// The measured values, and whether the campaign agrees with them.
 pub fn commissioning_document(values: &[MeasuredValue]) -> Document {
-    let mut table = Table::new(["actuator", "value", "declared", "measured", "95 % interval", "declaration"])
-        .with_texts([0, 1, 2, 3, 4, 5]);
+    let mut table = Table::new(["value", "declared", "measured", "95 % interval", "declaration"])
+        .with_texts([0, 1, 2, 3, 4]);
     for value in values {
+        let actuator = match value.actuator {
+            "turbine_inlet_pressure" => "P3",
+            "turbine_inlet_temperature" => "T3",
+            other => other,
+        };
         table.row([
-            value.actuator.to_owned(),
-            value.key.to_owned(),
+            format!("{actuator} {}", value.key),
             text(value, value.declared),
             measured(value),
             interval(value),

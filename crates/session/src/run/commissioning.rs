@@ -34,6 +34,8 @@ const P3_S: f64 = 60.0;
 const VALVE_S: f64 = 25.0;
 const STAIR_S: f64 = 8.0;
 const T3_S: f64 = 120.0;
+/// Longest warm-up, s. Bound: the shaft has its speed; housings that warm further change no actuator.
+const WARM_UP_S: f64 = 120.0;
 /// Rate of commands that jump, unit of the actuator per second. Bound: far beyond any actuator.
 const AT_ONCE_PER_S: f64 = 1e9;
 /// Deviation of the speed that ends a commissioning, ratio. Source: the guard's band of a run without control of the speed.
@@ -82,7 +84,11 @@ impl Commissioning {
             on_drift: None,
             actuators: Some(actuators),
             guards,
-            timing: Timing { cool_down_s: 0.0, ..campaign.timing },
+            timing: Timing {
+                warm_up_s: campaign.timing.warm_up_s.min(WARM_UP_S),
+                cool_down_s: 0.0,
+                ..campaign.timing
+            },
             ..campaign.clone()
         };
         let usual_rpm = SPEED_RATIO * campaign.limits.speed_max_rpm;
@@ -215,20 +221,11 @@ fn plan_of_steps(campaign: &Campaign, model: &Model, steps: Vec<PlanStep>) -> Re
         objective: "commissioning".to_owned(),
         seed: campaign.seed,
         made_from: hash_inputs(campaign, model)?,
-        warm_up_s: campaign.timing.warm_up_s,
+        warm_up_s: steps.first().map_or(0.0, |step| step.start_s),
         cool_down_s: 0.0,
         steps,
         surge_search_s: 0.0,
-        figures: PlanFigures {
-            sum_gradient_k: 0.0,
-            min_gradient_k: None,
-            worst_sigma_eta: None,
-            rms_error_eta: None,
-            rms_error_reported_eta: None,
-            prior_sensitivity_eta: None,
-            worst_error_eta: None,
-            minutes: 0.0,
-        },
+        figures: PlanFigures::default(),
         bound: None,
         bound_remark: None,
         remarks: Vec::new(),

@@ -35,8 +35,8 @@ pub use identification::thermal_model::{
 };
 pub use identification::warning::{
     Bound, CalibrationDefect, EndEvidence, EtaSignal, FitFailure, HeatCorrected, LeftOut, MapRegion,
-    ModelDoubt, ModelEvidence, NoCompression, PoorFit, Scaled, StepConflict, SuspectedFault, Swapped, TooFew,
-    Warning, WideInterval,
+    ModelDoubt, ModelEvidence, NoCompression, PoorFit, Scaled, SeenAtRest, StepConflict, SuspectedFault,
+    Swapped, TooFew, Warning, WideInterval,
 };
 pub use json_messages::{JsonMessages, Sentences, with_sentences};
 pub use maps::imported_map::{

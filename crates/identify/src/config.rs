@@ -98,6 +98,8 @@ pub struct IdentifyConfig {
     pub outlet_tap: PressureTap,
     /// Declared uncertainty of the sensors, SI units. Missing channels count as exact.
     pub declared: BTreeMap<Channel, DeclaredUncertainty>,
+    /// Their offsets before an isothermal zero, one standard deviation; empty without one.
+    pub offsets_before_zero: BTreeMap<Channel, f64>,
     /// Time correlation of sensor noise.
     pub noise_colour: NoiseColour,
     /// Sizes of what is efficiency for the method but may be something else.
@@ -137,6 +139,7 @@ impl Default for IdentifyConfig {
             inlet_tap: PressureTap::Total,
             outlet_tap: PressureTap::Total,
             declared: BTreeMap::new(),
+            offsets_before_zero: BTreeMap::new(),
             noise_colour: NoiseColour::default(),
             allowance: Allowance::default(),
             thresholds: Thresholds::default(),

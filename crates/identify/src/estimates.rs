@@ -2,6 +2,7 @@
 
 use crate::evidence::Evidence;
 use crate::faults::balances::efficiency::FittedEfficiencies;
+use crate::faults::balances::rest::rests;
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
 use crate::joint::{DynamicEfficiency, Joint};
@@ -35,11 +36,13 @@ impl Estimated {
     ) -> Self {
         let whole = evidence.is_whole();
         let ends = std::mem::take(&mut evidence.ends);
+        let rests = rests(recording, config);
         let likelihood = |fitted: Option<&FittedEfficiencies>| {
-            whole.then(|| faults::likelihood(recording, &ends, fitted, config, nominal))?
+            whole.then(|| faults::likelihood(recording, &ends, fitted, config, nominal, &rests))?
         };
-        let find =
-            |(likelihood, priors): &(Likelihood, Priors)| faults::find(likelihood, priors, config.method);
+        let find = |(likelihood, priors): &(Likelihood, Priors)| {
+            faults::find(likelihood, priors, config.method, &rests)
+        };
         let mut balances = likelihood(None);
         let mut faults = balances.as_ref().map(find).unwrap_or_default();
         let is_refused = faults.iter().any(|fault| fault.touches_points) || evidence.is_refused();

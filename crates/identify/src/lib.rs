@@ -39,11 +39,11 @@ pub use faults::end_readings::MAX_CORRELATED_ROWS;
 pub use faults::found_fault::{FoundFault, Suspect};
 pub use faults::nominal_rig::NominalRig;
 pub use identify::{Identified, identify, identify_each, identify_recording};
+pub use isothermal_zero::groups::ZeroSettings;
 pub use isothermal_zero::periodic::PeriodicError;
 pub use isothermal_zero::references::CellReference;
 pub use isothermal_zero::zero::{
-    IsothermalZero, LeftOutSensor, NoZero, NotZeroed, ZeroSettings, expected_after_zero, isothermal_zero,
-    zeroed,
+    IsothermalZero, LeftOutSensor, NoZero, NotZeroed, expected_after_zero, isothermal_zero, zeroed,
 };
 pub use isothermal_zero::zero_outcome::ZeroOutcome;
 pub use joint::expected::expected_together;

@@ -2,9 +2,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::lab::{Machine, campaign, eighteen, measured};
-use mapper_core::{Channel, DeclaredUncertainty, Method, Recording, Series};
+use mapper_core::{Channel, DeclaredUncertainty, Method, Recording, Series, Verdict};
 use mapper_identify::{
-    IdentifyConfig, NoZero, NotZeroed, ZeroSettings, expected_after_zero, identify, isothermal_zero, zeroed,
+    IdentifyConfig, NoZero, NotZeroed, Suspect, ZeroSettings, expected_after_zero, identify,
+    identify_recording, isothermal_zero, zeroed,
 };
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -119,6 +120,68 @@ fn what_is_no_soak_is_refused() {
     let mut broken = with_soak(&clean.recording, 300.0);
     broken.series.get_mut(&Channel::T2).unwrap().values.iter_mut().for_each(|value| *value += 4.0);
     assert!(matches!(zero(&broken), Err(NoZero::Uneven { .. })));
+}
+
+/// The same with the rest of [`with_soak`] behind the run.
+fn with_rest_behind(recording: &Recording, soak_s: f64) -> Recording {
+    let mut rested = with_soak(recording, soak_s);
+    let first = (soak_s * 10.0) as usize;
+    for series in rested.series.values_mut() {
+        let interval_s = series.t_s[1] - series.t_s[0];
+        series.values.rotate_left(first);
+        series.t_s = (0..series.t_s.len()).map(|i| i as f64 * interval_s).collect();
+    }
+    rested.steps.clone_from(&recording.steps);
+    rested
+}
+
+/// Five sensors beside a barometer, a cell's thermometer and cold oil: one that is ten of its declared offsets off at rest is named, before the
+/// run or behind it, and its points are doubtful. Sensors as declared are not named in any of forty recordings.
+#[test]
+fn a_sensor_that_reads_another_value_at_rest_is_named_and_no_sound_one() {
+    let clean = campaign(&eighteen()[..6], 60.0, Machine::default());
+    for (place, mut rested) in [with_soak(&clean.recording, 900.0), with_rest_behind(&clean.recording, 900.0)]
+        .into_iter()
+        .enumerate()
+    {
+        let t_s = rested.series[&Channel::T1].t_s.clone();
+        let cell = Series { values: vec![298.15; t_s.len()], t_s };
+        rested.series.extend([(Channel::TOil, cell.clone()), (Channel::TAmb, cell)]);
+        let found = |recording: &Recording, declared| {
+            let config = IdentifyConfig {
+                method: Method::Steady,
+                declared,
+                barometer_pa: Some(100e3),
+                ..IdentifyConfig::default()
+            };
+            identify_recording(recording, &config, None).unwrap()
+        };
+        for seed in 0..20 {
+            let mut rng = Pcg64::seed_from_u64(seed);
+            let (recording, declared) = measured(&rested, 1.0, 1.0, &mut rng);
+            let sound = found(&recording, declared);
+            assert!(sound.faults.is_empty(), "place {place}, seed {seed}: {:?}", sound.faults);
+        }
+        let faults = [
+            (Channel::T1, -2.5),
+            (Channel::T2, 2.5),
+            (Channel::Tc, 3.0),
+            (Channel::P1, -1500.0),
+            (Channel::P2, 3000.0),
+        ];
+        for (seed, (channel, size)) in faults.into_iter().enumerate() {
+            let mut rng = Pcg64::seed_from_u64(100 + seed as u64);
+            let (mut recording, declared) = measured(&rested, 1.0, 1.0, &mut rng);
+            recording.series.get_mut(&channel).unwrap().values.iter_mut().for_each(|value| *value += size);
+            let found = found(&recording, declared);
+            let [fault] = found.faults.as_slice() else { panic!("{channel}: {:?}", found.faults) };
+            assert!(matches!(fault.suspect, Suspect::Sensor(of) if of.channels == [channel]), "{fault:?}");
+            assert!((fault.value - size).abs() < 4.0 * fault.sigma && fault.at_rest.is_some(), "{fault:?}");
+            // An apparent efficiency does not depend on the housing.
+            let doubtful = |verdict| verdict != Verdict::Good || channel == Channel::Tc;
+            assert!(found.points.iter().flatten().all(|point| doubtful(point.verdict)), "{channel}");
+        }
+    }
 }
 
 /// For a diagnosis one sensor may exceed its declared offset: three that read 25 degC determine its size. If two have opposite offsets,

@@ -17,6 +17,11 @@ const USUAL_NOISE_PA: f64 = 60.0;
 /// Noise of a sample of temperature, K. Bound: thermocouples in gas have 0.1 to 0.3 K.
 const USUAL_NOISE_K: f64 = 0.2;
 
+/// Offset of a thermometer without declaration, K. Source: class 1 of IEC 60584-1, 1.5 K, as the limits of a rectangular distribution.
+const USUAL_OFFSET_K: f64 = 0.9;
+/// Offset of a pressure sensor without declaration, Pa. Bound: 0.25 % of a range of 4 bar, as the limits of a rectangular distribution.
+const USUAL_OFFSET_PA: f64 = 600.0;
+
 /// Merges the declared uncertainties of every sensor of a recording, by a rule common to all programs.
 ///
 /// The most specific declaration applies. `channel_map` describes the sensors of this recording: for a channel declared there, its noise and
@@ -122,6 +127,11 @@ pub fn usual_noise_sigma(channel: Channel) -> f64 {
         Dimension::Pressure => USUAL_NOISE_PA,
         Dimension::Temperature | Dimension::Ratio => USUAL_NOISE_K,
     }
+}
+
+/// Offset of a usual thermometer or pressure sensor of a gas stand, one standard deviation, K or Pa.
+pub fn usual_offset_sigma(channel: Channel) -> f64 {
+    if channel.info().dimension == Dimension::Pressure { USUAL_OFFSET_PA } else { USUAL_OFFSET_K }
 }
 
 #[cfg(test)]

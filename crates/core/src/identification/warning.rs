@@ -303,6 +303,20 @@ pub struct SuspectedFault {
     pub alternatives: Vec<String>,
     /// Whether results of the points depend on it; if not, the points keep their verdicts.
     pub touches_points: bool,
+    /// Where it shows while the machine is at rest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_rest: Option<SeenAtRest>,
+}
+
+/// A standstill in which sensors that must read the same do not.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SeenAtRest {
+    /// Start of the compared part, s.
+    pub start_s: f64,
+    /// Its end, s.
+    pub end_s: f64,
+    /// Whether an isothermal zero can use this standstill.
+    pub is_soak: bool,
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! A detected fault and its description.
 
 use crate::faults::balance_rows::Machine;
-use mapper_core::{Channel, FaultKind, SuspectedFault};
+use mapper_core::{Channel, FaultKind, SeenAtRest, SuspectedFault};
 use mapper_physics::rig::sensor_fault::SensorFault;
 use serde::{Serialize, Serializer};
 use std::fmt;
@@ -28,6 +28,8 @@ pub struct FoundFault {
     pub alternatives: Vec<Suspect>,
     /// Whether any number of the points depends on it; if not, they keep their verdicts.
     pub touches_points: bool,
+    /// Where it shows while the machine is at rest.
+    pub at_rest: Option<SeenAtRest>,
 }
 
 impl Suspect {
@@ -65,6 +67,7 @@ impl From<&FoundFault> for SuspectedFault {
             unit: found.suspect.unit().to_owned(),
             alternatives: found.alternatives.iter().map(ToString::to_string).collect(),
             touches_points: found.touches_points,
+            at_rest: found.at_rest,
         }
     }
 }

@@ -17,6 +17,7 @@ use crate::IdentifyConfig;
 use crate::faults::balance_rows::{MACHINE, Machine, Rows};
 use crate::faults::balances::conditions;
 use crate::faults::balances::efficiency::FittedEfficiencies;
+use crate::faults::balances::rest::{self, Rest};
 use crate::faults::balances::valve::{Opening, sides};
 use crate::faults::end_readings::{CHANNELS, MAX_CORRELATED_ROWS, Readings, span_s};
 use crate::faults::found_fault::{FoundFault, Suspect};
@@ -47,6 +48,7 @@ pub(crate) fn likelihood(
     fitted: Option<&FittedEfficiencies>,
     config: &IdentifyConfig,
     nominal: Option<&NominalRig<'_>>,
+    rests: &[Rest],
 ) -> Option<(Likelihood, Priors)> {
     let all = all_readings(recording, ends, config.rest)?;
     let readings: Vec<Readings> = all.iter().flatten().copied().collect();
@@ -65,6 +67,7 @@ pub(crate) fn likelihood(
     balances.extend(balances::housing::rows(recording, config, &used));
     balances.extend(balances::inlet::rows(recording, &all, config));
     balances.extend(fitted.and_then(|fitted| balances::efficiency::rows(fitted, &all, reference, nominal)));
+    balances.extend(rests.iter().map(|rest| rest.rows.clone()));
     if let Some(nominal) = nominal {
         balances.extend(fitted.and_then(|fitted| balances::convection::rows(fitted, &all, config, nominal)));
         balances.extend(balances::conditions::rows(recording, &all, config, nominal));
@@ -79,7 +82,12 @@ pub(crate) fn likelihood(
 }
 
 /// Faults that explain why the balances of a recording do not close; empty if they close.
-pub(crate) fn find(likelihood: &Likelihood, priors: &Priors, method: Method) -> Vec<FoundFault> {
+pub(crate) fn find(
+    likelihood: &Likelihood,
+    priors: &Priors,
+    method: Method,
+    rests: &[Rest],
+) -> Vec<FoundFault> {
     let likelier_than = |member: &Member, limit: f64| -> Vec<Suspect> {
         let others = member.alternatives.iter().take_while(|(_, relative)| *relative > limit);
         others.map(|(index, _)| suspect(*index)).collect()
@@ -91,13 +99,19 @@ pub(crate) fn find(likelihood: &Likelihood, priors: &Priors, method: Method) -> 
         alternatives: likelier_than(&member, EXCLUDED_ODDS),
         touches_points: touches_points(suspect(member.index), method)
             || likelier_than(&member, MIN_WEIGHT).into_iter().any(|other| touches_points(other, method)),
+        at_rest: match suspect(member.index) {
+            Suspect::Sensor(fault) => rest::seen(rests, &fault, member.value),
+            Suspect::Machine(_) => None,
+        },
     };
     likelihood.explain(priors).unwrap_or_default().members.into_iter().map(found).collect()
 }
 
-/// Whether a number of a point depends on it: none depends on the valve, and an apparent efficiency does not depend on the housing.
+/// Whether a number of a compressor's point depends on it: none depends on valve or turbine, and an apparent efficiency does not depend on the housing.
 fn touches_points(suspect: Suspect, method: Method) -> bool {
-    let housing = method == Method::Steady && suspect.channels() == [Channel::Tc];
+    let channels = suspect.channels();
+    let elsewhere = !channels.is_empty() && channels.iter().all(|channel| !CHANNELS.contains(channel));
+    let housing = method == Method::Steady && channels == [Channel::Tc] || elsewhere;
     let measured = |machine| match machine {
         Machine::ValveArea | Machine::ValvePlay | Machine::Condition(_) => true,
         Machine::FlowCapacity | Machine::Efficiency | Machine::Convection => false,

@@ -39,26 +39,34 @@ impl CellReference {
     }
 }
 
+/// Reading of the cell's thermometer or barometer, and its standard deviation; `None` if there is none.
+pub(crate) fn cell_reading(
+    recording: &Recording,
+    config: &IdentifyConfig,
+    (start_s, end_s): (f64, f64),
+    dimension: Dimension,
+) -> Option<(f64, f64)> {
+    if dimension == Dimension::Pressure {
+        return Some((config.barometer_pa?, BAROMETER_SIGMA_PA));
+    }
+    let values = recording.series.get(&Channel::TAmb)?.slice(start_s, end_s).1;
+    let usable = values.iter().copied().filter(|value| is_reading(Channel::TAmb, *value));
+    let declared = config.sensor(Channel::TAmb).offset_sigma;
+    Some((mean(usable)?, if declared > 0.0 { declared } else { CELL_SIGMA_K }))
+}
+
 /// Compares the common reading `common` of a group with the instrument of the cell; `None` if there is none. `used`: segment of the soak, s. `sigma`:
 /// standard deviation of the common reading.
 pub(crate) fn compare(
     recording: &Recording,
     config: &IdentifyConfig,
-    (start_s, end_s): (f64, f64),
+    span_s: (f64, f64),
     first: Channel,
     common: f64,
     sigma: f64,
 ) -> Option<CellReference> {
     let dimension = first.info().dimension;
-    let (reference, reference_sigma) = match dimension {
-        Dimension::Temperature => {
-            let values = recording.series.get(&Channel::TAmb)?.slice(start_s, end_s).1;
-            let usable = values.iter().copied().filter(|value| is_reading(Channel::TAmb, *value));
-            let declared = config.sensor(Channel::TAmb).offset_sigma;
-            (mean(usable)?, if declared > 0.0 { declared } else { CELL_SIGMA_K })
-        }
-        _ => (config.barometer_pa?, BAROMETER_SIGMA_PA),
-    };
+    let (reference, reference_sigma) = cell_reading(recording, config, span_s, dimension)?;
     // Gauge pressures contain the barometer's own error.
     let own = if dimension == Dimension::Pressure { sigma.hypot(config.barometer_sigma_pa) } else { sigma };
     let off = common - reference;

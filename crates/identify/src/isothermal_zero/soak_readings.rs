@@ -2,11 +2,18 @@
 
 use mapper_core::unit_factors::S_PER_MIN;
 use mapper_core::{Channel, Recording, Series, StepMarker, is_reading, plausible};
-use mapper_numerics::statistics::mean;
+use mapper_numerics::statistics::{mean, nearest_rank};
 
 /// Parts of a soak: its drift is the difference of last and first; the limit leaves the first out. Source: the slope between
 /// thirds has nearly the smallest error (Bartlett, Biometrics 5, 1949).
 pub(super) const SOAK_PARTS: f64 = 3.0;
+
+/// Shortest standstill in which sensors are compared, s. Bound: pipes empty within seconds, and its second half averages noise to a quarter.
+const SHORTEST_REST_S: f64 = 30.0;
+/// Rank of the reading that counts as that of the running machine. Bound: a run of a few minutes in half an hour of rest.
+const RUNNING_SHARE: f64 = 0.99;
+/// Share of that flow below which none flows. Bound: the zero error of a flow meter.
+const STILL_FLOW_SHARE: f64 = 0.05;
 
 /// Whether a shaft is slower than any running machine's, and hence at standstill.
 pub(super) fn is_at_rest(speed_rpm: f64) -> bool {
@@ -21,28 +28,50 @@ pub(super) fn at_rest(recording: &Recording) -> (f64, f64) {
         last.is_none_or(|speed_rpm| !is_at_rest(*speed_rpm))
     };
     let first_s = recording.steps.iter().find(runs).map_or(f64::INFINITY, |step| step.start_s);
-    let Some(speed) = recording.series.get(&Channel::ShaftSpeed) else { return (0.0, 0.0) };
-    let before = speed.t_s.partition_point(|t| *t < first_s);
-    let rests = |i: usize| speed.values.get(i).is_some_and(|speed_rpm| is_at_rest(*speed_rpm));
-    let Some(last) = (0..before).rev().find(|i| rests(*i)) else { return (0.0, 0.0) };
-    let first = (0..last).rev().find(|i| !rests(*i)).map_or(0, |i| i + 1);
+    standstills(recording, first_s).pop().unwrap_or_default()
+}
+
+/// Every standstill that begins before `before_s`, in order.
+fn standstills(recording: &Recording, before_s: f64) -> Vec<(f64, f64)> {
+    let Some(speed) = recording.series.get(&Channel::ShaftSpeed) else { return Vec::new() };
+    let before = speed.t_s.partition_point(|t| *t < before_s).min(speed.values.len());
+    let places: Vec<usize> = (0..before).filter(|i| is_at_rest(speed.values[*i])).collect();
     // The last sample at standstill may already belong to the start of the machine.
-    (speed.t_s[first], speed.t_s[last.saturating_sub(1).max(first)])
+    let span = |run: &[usize]| (speed.t_s[run[0]], speed.t_s[run[run.len().saturating_sub(2)]]);
+    places.chunk_by(|a, b| b - a == 1).map(span).collect()
+}
+
+/// The standstills of a recording whose machine turns at another time, and in which no air flows: a dead pick-up also reads no speed.
+pub(super) fn rests(recording: &Recording) -> Vec<(f64, f64)> {
+    let size = |channel: Channel, (start_s, end_s): (f64, f64), share: f64| {
+        let values = recording.series.get(&channel)?.slice(start_s, end_s).1;
+        nearest_rank(values.iter().filter(|value| value.is_finite()).map(|value| value.abs()), share)
+    };
+    let whole = (f64::NEG_INFINITY, f64::INFINITY);
+    let turns = size(Channel::ShaftSpeed, whole, RUNNING_SHARE).is_some_and(|rpm| !is_at_rest(rpm));
+    let is_still = |rest: &(f64, f64)| {
+        [Channel::CompressorFlow, Channel::TurbineFlow].into_iter().all(|flow| {
+            let (here, running) = (size(flow, *rest, 0.5), size(flow, whole, RUNNING_SHARE));
+            here.zip(running).is_none_or(|(here, running)| here < STILL_FLOW_SHARE * running)
+        })
+    };
+    let all = if turns { standstills(recording, f64::INFINITY) } else { Vec::new() };
+    all.into_iter().filter(|rest| rest.1 - rest.0 >= SHORTEST_REST_S && is_still(rest)).collect()
 }
 
 /// Reading of a sensor at standstill, K or Pa.
 #[derive(Clone, Copy)]
-pub(super) struct Reading {
-    pub(super) channel: Channel,
-    pub(super) mean: f64,
+pub(crate) struct Reading {
+    pub(crate) channel: Channel,
+    pub(crate) mean: f64,
     /// Remaining standard deviation of its offset.
-    pub(super) own: f64,
+    pub(crate) own: f64,
     /// The same with the declared offset.
-    pub(super) total: f64,
+    pub(crate) total: f64,
     /// Drift, K or Pa per minute.
-    pub(super) drift_per_min: f64,
+    pub(crate) drift_per_min: f64,
     /// Standard deviation of the drift by noise.
-    pub(super) drift_sigma: f64,
+    pub(crate) drift_sigma: f64,
 }
 
 impl Reading {
@@ -75,8 +104,8 @@ pub(super) fn usable(channel: Channel, values: &[f64]) -> Vec<f64> {
 }
 
 pub(super) struct SoakMean {
-    pub(super) mean: f64,
-    pub(super) drift_per_min: f64,
+    pub(crate) mean: f64,
+    pub(crate) drift_per_min: f64,
 }
 
 /// Mean of a channel over a segment, and its drift from the first to the last third.

@@ -6,15 +6,18 @@
 //! the cell's thermometer and barometer, and keeps the remaining uncertainty.
 
 use crate::IdentifyConfig;
+use crate::isothermal_zero::groups::{
+    CORE, Group, HOT_SIDE, HOUSINGS, SHORTEST_SOAK_S, ZeroSettings, groups,
+};
 use crate::isothermal_zero::periodic::{self, PeriodicError};
-use crate::isothermal_zero::references::{CellReference, compare};
+use crate::isothermal_zero::references::{CellReference, cell_reading, compare};
 use crate::isothermal_zero::relaxation;
 use crate::isothermal_zero::soak_readings::{
-    Reading, SOAK_PARTS, at_rest, combined_sigma, common, soak_mean, usable,
+    Reading, SOAK_PARTS, at_rest, combined_sigma, common, rests, soak_mean, usable,
 };
 use crate::step_data::samples::TREND_BLOCK_S;
 use mapper_core::unit_factors::S_PER_MIN;
-use mapper_core::{Channel, DeclaredUncertainty, Recording, SAMPLE_INTERVAL_S, Soak};
+use mapper_core::{Channel, DeclaredUncertainty, Recording, SAMPLE_INTERVAL_S};
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
 use mapper_observe::declared::{CommonOffset, rest, usual_noise_sigma};
@@ -22,59 +25,11 @@ use mapper_physics::rig::sensor_fault::Rest;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Longest segment at the end of a soak that is used, s. Bound: on average over it, noise of 0.1 K is below 0.01 K.
-const LONGEST_SOAK_S: f64 = 600.0;
-/// Minimum length of that segment, s. Bound: noise of 0.1 K at 10 Hz leaves its drift an error of 0.02 K/min.
-const SHORTEST_SOAK_S: f64 = 60.0;
-
 /// Time constant with which a drifting reading approaches its limit, min. Bound: the middle of those of stopped housings, 700 s.
 const DRIFT_TIME_CONSTANT_MIN: f64 = 700.0 / S_PER_MIN;
 /// Share of the distance between a housing and the common reading by which the gas at its probes may differ. Judgement: gas at rest in a pipe
 /// flange of a warm housing; a thermometer five diameters away has the room's temperature to a tenth.
 const WARM_HOUSING_SHARE: f64 = 0.1;
-
-/// Residual non-uniformity of a soak, and the criteria by which a soak is recognised.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ZeroSettings {
-    /// Residual temperature non-uniformity (one standard deviation of a sensor from the mean), K, > 0.
-    pub temperature_sigma_k: f64,
-    /// Residual pressure non-uniformity, one standard deviation, Pa, > 0.
-    pub pressure_sigma_pa: f64,
-    /// Longest segment before the first step that is used, s: the last one of the standstill.
-    pub longest_s: f64,
-    /// Minimum length of the segment, s.
-    pub shortest_s: f64,
-    /// Maximum drift of a temperature over the segment, K/min; a faster drift means an unfinished soak.
-    pub drift_k_min: f64,
-    /// Whether one temperature sensor may exceed its declared offset.
-    pub allows_a_fault: bool,
-}
-
-impl Default for ZeroSettings {
-    /// Default non-uniformity; accepts the last minute to ten minutes if they drift by less than 0.1 K/min.
-    fn default() -> Self {
-        ZeroSettings {
-            temperature_sigma_k: Soak::TEMPERATURE_SIGMA_K,
-            pressure_sigma_pa: Soak::PRESSURE_SIGMA_PA,
-            longest_s: LONGEST_SOAK_S,
-            shortest_s: SHORTEST_SOAK_S,
-            drift_k_min: Soak::MAX_DRIFT_K_MIN,
-            allows_a_fault: false,
-        }
-    }
-}
-
-impl From<Soak> for ZeroSettings {
-    /// With the declared non-uniformity.
-    fn from(soak: Soak) -> Self {
-        ZeroSettings {
-            temperature_sigma_k: soak.temperature_sigma_k,
-            pressure_sigma_pa: soak.pressure_sigma_pa,
-            ..ZeroSettings::default()
-        }
-    }
-}
 
 /// The estimated offsets and their segment.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -170,7 +125,7 @@ pub fn isothermal_zero(
     let mut zero = IsothermalZero { start_s, end_s, periodic, ..IsothermalZero::default() };
     let soak = SoakReadings { recording, config, settings, rest, used: (start_s, end_s) };
     for group in groups(settings) {
-        let readings = soak.resting(&group, &mut zero.left_out);
+        let readings = soak.gaining(&group, &mut zero.left_out);
         let Some((common, readings)) = soak.agreeing(&group, readings, &mut zero.left_out)? else { continue };
         let sigma = combined_sigma(&readings);
         let (mut shift, mut common_sigma) = (0.0, sigma);
@@ -205,6 +160,42 @@ pub fn isothermal_zero(
         }));
     }
     Ok(zero)
+}
+
+/// Sensors that must read the same in a standstill.
+pub(crate) struct AtRest {
+    /// The part of the standstill that is compared, s.
+    pub(crate) used_s: (f64, f64),
+    /// Whether a zero may use it: it is the last one before the first step, and long enough.
+    pub(crate) is_soak: bool,
+    /// What rests.
+    pub(crate) readings: Vec<Reading>,
+    /// Reading of the cell's instrument and its standard deviation.
+    pub(crate) cell: Option<(f64, f64)>,
+}
+
+/// The comparable readings of every standstill, each group of sensors by itself.
+pub(crate) fn all_at_rest(recording: &Recording, config: &IdentifyConfig) -> Vec<AtRest> {
+    let settings = ZeroSettings { shortest_s: 0.0, ..ZeroSettings::default() };
+    let soak_start_s = at_rest(recording).0;
+    let of_rest = |rest: (f64, f64)| {
+        let (length_s, start_s) = (rest.1 - rest.0, rest.1 - used_s(rest.1 - rest.0, &settings));
+        let used = (start_s, rest.1);
+        let soak = SoakReadings { recording, config, settings: &settings, rest, used };
+        let of_group = |group: Group| {
+            let mut readings = soak.resting(&group, &mut Vec::new());
+            if group.drift_limit_per_min.is_some() {
+                soak.widen_heated(&mut readings);
+            }
+            let dimension = group.channels[0].info().dimension;
+            let cell =
+                group.has_reference.then(|| cell_reading(recording, config, used, dimension)).flatten();
+            let is_soak = rest.0 == soak_start_s && length_s >= SHORTEST_SOAK_S;
+            AtRest { used_s: used, is_soak, readings, cell }
+        };
+        groups(&settings).map(of_group)
+    };
+    rests(recording).into_iter().flat_map(of_rest).collect()
 }
 
 /// Length of the segment at the end of a soak that is used, s: half of it, since the first half settles, within the limits of the settings.
@@ -254,7 +245,12 @@ impl SoakReadings<'_> {
                 _ => {}
             }
         }
-        // A zero that is less certain than the declaration is none.
+        readings
+    }
+
+    /// Those of them by which a zero gains: one that is less certain than the declaration is none.
+    fn gaining(&self, group: &Group, left_out: &mut Vec<LeftOutSensor>) -> Vec<Reading> {
+        let mut readings = self.resting(group, left_out);
         readings.retain(|reading| {
             let declared = self.config.sensor(reading.channel).offset_sigma;
             let improves = declared == 0.0 || reading.own < declared;
@@ -265,6 +261,27 @@ impl SoakReadings<'_> {
             improves
         });
         readings
+    }
+
+    /// Adds the distance of their sources of heat to the readings of housings. Leaves out the oil, which may be heated, and Tc if the oil is not
+    /// known. Without T1 and T2 nothing shows what rests.
+    fn widen_heated(&self, readings: &mut Vec<Reading>) {
+        let gas = readings.iter().filter(|reading| matches!(reading.channel, Channel::T1 | Channel::T2));
+        let Some(gas_k) = mean(gas.map(|reading| reading.mean)) else { return readings.clear() };
+        let distance_k = |source: Channel| {
+            let of = soak_mean(self.recording, source, self.used.0, self.used.1)?;
+            let declared = self.config.sensor(source).offset_sigma;
+            Some(((of.mean - gas_k).abs() - EXCLUDE_SIGMAS * declared).max(0.0))
+        };
+        let (oil_k, turbine_k) = (distance_k(Channel::TOil), distance_k(Channel::Tt).unwrap_or(0.0));
+        readings.retain_mut(|reading| {
+            match reading.channel {
+                Channel::Tc => reading.widen(oil_k.unwrap_or(0.0).max(turbine_k)),
+                Channel::Tt => reading.widen(oil_k.unwrap_or(0.0)),
+                _ => {}
+            }
+            reading.channel != Channel::TOil && (reading.channel != Channel::Tc || oil_k.is_some())
+        });
     }
 
     /// The reading of a channel at rest, or why it does not rest; `None` if it is not recorded, or not declared although only a declaration makes
@@ -426,6 +443,7 @@ pub fn zeroed(
         }
         if let (Some(declared), Some(left)) = (config.declared.get_mut(channel), zero.left_sigma.get(channel))
         {
+            config.offsets_before_zero.insert(*channel, declared.offset_sigma);
             *declared = DeclaredUncertainty { offset_sigma: *left, ..*declared };
         }
     }
@@ -482,48 +500,6 @@ pub fn expected_after_zero(
 fn sigma_of_mean(noise_sigma: f64, used_s: f64, config: &IdentifyConfig) -> f64 {
     let colour = config.noise();
     noise_sigma * variance_of_mean(colour.first_order_variance_ratio(), used_s, colour.time_constant_s).sqrt()
-}
-
-/// Sensors of the turbine's gas and housing: they may stay warm when the others rest, and never refuse a zero.
-const HOT_SIDE: [Channel; 3] = [Channel::T3, Channel::T4, Channel::Tt];
-/// Sensors of housings, whose readings are extrapolated to their limits.
-const HOUSINGS: [Channel; 2] = [Channel::Tc, Channel::Tt];
-/// Number of channels at the head of a group without which it is not zeroed. Bound: one sensor has nothing to be compared with.
-const CORE: usize = 2;
-
-/// Sensors that read the same at standstill.
-struct Group {
-    channels: &'static [Channel],
-    /// Residual non-uniformity, K or Pa.
-    sigma: f64,
-    /// Maximum drift, per minute; `None` for pressures, which follow the weather together.
-    drift_limit_per_min: Option<f64>,
-    /// Whether the cell has an instrument for the same quantity.
-    has_reference: bool,
-}
-
-impl Group {
-    /// Whether the group is not zeroed without this channel.
-    fn is_core(&self, channel: Channel) -> bool {
-        self.channels.iter().take(CORE).any(|core| *core == channel)
-    }
-}
-
-fn groups(settings: &ZeroSettings) -> [Group; 3] {
-    let [temperatures, pressures, turbine_pressures] = Soak::EQUAL_AT_REST;
-    let of_pressures = |channels, has_reference| Group {
-        channels,
-        sigma: settings.pressure_sigma_pa,
-        drift_limit_per_min: None,
-        has_reference,
-    };
-    let temperatures = Group {
-        channels: temperatures,
-        sigma: settings.temperature_sigma_k,
-        drift_limit_per_min: Some(settings.drift_k_min),
-        has_reference: true,
-    };
-    [temperatures, of_pressures(pressures, true), of_pressures(turbine_pressures, false)]
 }
 
 /// The standard error of the limit of a housing after a soak of `soak_s`.

@@ -1,7 +1,8 @@
 //! Result of the isothermal zero that a campaign requests.
 
 use crate::IdentifyConfig;
-use crate::isothermal_zero::zero::{IsothermalZero, NoZero, ZeroSettings, isothermal_zero, zeroed};
+use crate::isothermal_zero::groups::ZeroSettings;
+use crate::isothermal_zero::zero::{IsothermalZero, NoZero, isothermal_zero, zeroed};
 use mapper_core::Recording;
 use serde::{Serialize, Serializer};
 

@@ -178,13 +178,17 @@ const OF_COMPRESSOR: [Channel; 7] = {
     [ShaftSpeed, CompressorFlow, P1, T1, P2, T2, Tc]
 };
 
-/// Faults of the compressor's sensors that add to a reading in proportion to their size.
+/// Sensors of the turbine that are compared at rest: pressures with each other, temperatures with all others.
+const TURBINE_AT_REST: [Channel; 5] = [Channel::P3, Channel::P4, Channel::T3, Channel::T4, Channel::Tt];
+
+/// Faults of the compressor's sensors that add to a reading in proportion to their size, and offsets of the turbine's, which a rest shows.
 pub fn additive() -> impl Iterator<Item = &'static SensorFault> {
     use FaultKind::{Drift, Gain, Offset, TowardsWall};
     CATALOGUE.iter().filter(|fault| {
         let additive = matches!(fault.kind, Offset | Gain | Drift)
             || (fault.kind == TowardsWall && matches!(fault.channels, [Channel::T1 | Channel::T2]));
-        additive && fault.channels.iter().all(|channel| OF_COMPRESSOR.contains(channel))
+        let of_turbine = fault.kind == Offset && TURBINE_AT_REST.contains(&fault.channels[0]);
+        additive && (of_turbine || fault.channels.iter().all(|channel| OF_COMPRESSOR.contains(channel)))
     })
 }
 

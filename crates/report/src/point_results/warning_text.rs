@@ -316,15 +316,42 @@ fn contradiction(faults: &[SuspectedFault]) -> Sentence {
             let joint = if index == 0 { "" } else { ", and " };
             text.then(joint.to_owned().into()).then(describe_suspected_fault(fault))
         });
-    let evidence = sentence!(
-        ": without this, conditions, valve, head, heat of the housing and efficiencies contradict each other; "
-    );
+    let at_rest = faults.iter().find_map(|fault| Some((fault, fault.at_rest?)));
+    let evidence = match at_rest {
+        Some((_, rest)) => sentence!(
+            ": from {} to {} s the machine rests, and sensors that must then read the same do not; ",
+            number(rest.start_s, 0),
+            number(rest.end_s, 0)
+        ),
+        None => sentence!(
+            ": without this, conditions, valve, head, heat of the housing and efficiencies contradict each other; "
+        ),
+    };
     faults_found.then(evidence).then(match faults.iter().any(|fault| fault.touches_points) {
+        true if let Some((fault, rest)) = at_rest => offset_remedy(fault, rest.is_soak),
         true => sentence!(
             "compare the channels at standstill (`zero`) and with the barometer, and repair the sensor, declare its uncertainty or correct the \
              declared conditions (`boundary`)"
         ),
-        false => sentence!("no point depends on it"),
+        false => match at_rest {
+            Some((fault, rest)) => {
+                sentence!("only the turbine's points depend on it; ").then(offset_remedy(fault, rest.is_soak))
+            }
+            None => sentence!("no point depends on it"),
+        },
+    })
+}
+
+/// What to do about a sensor that reads another value at rest than its neighbours.
+fn offset_remedy(fault: &SuspectedFault, is_soak: bool) -> Sentence {
+    let ([channel], "K" | "Pa") = (fault.channels.as_slice(), fault.unit.as_str()) else {
+        return sentence!("repair the sensors, or declare their uncertainty");
+    };
+    let offset = with_unit(four_figures(fault.value.abs()), &fault.unit);
+    let declared = format!("repair the sensor, or declare `sensors: {channel}: {{offset: {offset}}}`");
+    Sentence::from(match is_soak {
+        true => format!("{declared}, and `zero: {{soak: 10 min}}` subtracts what it reads at rest"),
+        false => declared,
     })
 }
 

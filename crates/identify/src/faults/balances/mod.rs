@@ -1,4 +1,4 @@
-//! Physical relations that reveal sensor faults: head, housing heat, inlet temperature, valve flow, efficiency, convection, and conditions.
+//! Physical relations that reveal sensor faults: head, housing heat, inlet temperature, valve flow, efficiency, convection, conditions, and rest.
 
 pub(crate) mod conditions;
 pub(crate) mod convection;
@@ -6,4 +6,5 @@ pub(crate) mod efficiency;
 pub(crate) mod head;
 pub(crate) mod housing;
 pub(crate) mod inlet;
+pub(crate) mod rest;
 pub(crate) mod valve;

@@ -1,0 +1,110 @@
+//! Sensors that must read the same at standstill: temperatures, pressures of the compressor, and of the turbine.
+//!
+//! The zero subtracts what they read differently, if a campaign asks for it. Here the differences are evidence: one beyond the declared offsets is
+//! the fault of a sensor. The cell's thermometer and barometer decide between two sensors, but do not accuse both: they may be far from the machine.
+
+use crate::IdentifyConfig;
+use crate::faults::balance_rows::{Rows, own};
+use crate::faults::end_readings::{CHANNELS, PerChannel, Readings, span_s};
+use crate::isothermal_zero::soak_readings::Reading;
+use crate::isothermal_zero::zero::{AtRest, all_at_rest};
+use mapper_core::{Channel, FaultKind, Recording, SeenAtRest};
+use mapper_numerics::statistics::{EXCLUDE_SIGMAS, HINT_SIGMAS};
+use mapper_observe::declared::usual_offset_sigma;
+use mapper_physics::rig::sensor_fault::{SensorFault, gain_error};
+use nalgebra::DMatrix;
+
+/// What a group of sensors reads in a standstill.
+#[derive(Debug, Clone)]
+pub(crate) struct Rest {
+    pub(crate) rows: Rows,
+    seen: SeenAtRest,
+}
+
+/// A sensor of the group, or the instrument of the cell.
+struct Member {
+    channel: Option<Channel>,
+    value: f64,
+    /// Its error but for the parameters of all balances.
+    sigma: f64,
+}
+
+/// One balance for each group and standstill: every reading minus that of the first member.
+pub(crate) fn rests(recording: &Recording, config: &IdentifyConfig) -> Vec<Rest> {
+    let Some(span_s) = span_s(recording) else { return Vec::new() };
+    all_at_rest(recording, config).iter().filter_map(|at_rest| rest(at_rest, config, span_s)).collect()
+}
+
+fn rest(at_rest: &AtRest, config: &IdentifyConfig, (first_s, last_s): (f64, f64)) -> Option<Rest> {
+    let of_cell = at_rest.cell.filter(|(value, sigma)| {
+        let agrees = |reading: &Reading| {
+            (reading.mean - value).abs()
+                <= EXCLUDE_SIGMAS * sigma.hypot(offset_sigma(reading.channel, config))
+        };
+        at_rest.readings.iter().any(agrees)
+    });
+    let cell = of_cell.map(|(value, sigma)| Member { channel: None, value, sigma });
+    let members: Vec<Member> =
+        at_rest.readings.iter().map(|reading| member(reading, config)).chain(cell).collect();
+    let (first, others) = members.split_first().filter(|(_, others)| !others.is_empty())?;
+    let sign = |of: &Member, channel: Channel| f64::from(u8::from(of.channel == Some(channel)));
+    let by = |other: &Member, channel: Channel| sign(other, channel) - sign(first, channel);
+    let value = |channel: Channel| {
+        members.iter().find(|member| member.channel == Some(channel)).map_or(f64::NAN, |member| member.value)
+    };
+    let (start_s, end_s) = at_rest.used_s;
+    let readings = Readings {
+        values: CHANNELS.map(value),
+        run_ratio: ((end_s - first_s) / (last_s - first_s)).clamp(0.0, 1.0),
+        rest_pressure_pa: config.rest_pressure_pa,
+        air: config.air,
+    };
+    let count = others.len();
+    let turbine = members.iter().filter_map(|member| member.channel).filter(|own| !CHANNELS.contains(own));
+    let offsets = turbine.map(|channel| {
+        (channel, FaultKind::Offset, others.iter().map(|other| by(other, channel)).collect::<Vec<f64>>())
+    });
+    // Gas and wall have one temperature.
+    let no_conduction = (Channel::T2, FaultKind::TowardsWall, vec![0.0; count]);
+    Some(Rest {
+        rows: Rows {
+            residual: others.iter().map(|other| other.value - first.value).collect(),
+            covariance: own(others.iter().map(|other| other.sigma))
+                + DMatrix::from_element(count, count, first.sigma * first.sigma),
+            readings: vec![readings; count],
+            by_reading: others
+                .iter()
+                .map(|other| -> PerChannel { CHANNELS.map(|channel| by(other, channel)) })
+                .collect(),
+            by_machine: Vec::new(),
+            by_fault: offsets.chain([no_conduction]).collect(),
+        },
+        seen: SeenAtRest { start_s, end_s, is_soak: at_rest.is_soak },
+    })
+}
+
+fn member(reading: &Reading, config: &IdentifyConfig) -> Member {
+    let Reading { channel, mean, own, .. } = *reading;
+    let declared = config.sensor(channel);
+    let is_parameter = CHANNELS.contains(&channel) && declared.offset_sigma == offset_sigma(channel, config);
+    let gain = declared.gain_sigma_ratio * gain_error(channel, mean, config.rest_pressure_pa);
+    let other = if is_parameter { 0.0 } else { offset_sigma(channel, config).hypot(gain) };
+    Member { channel: Some(channel), value: mean, sigma: own.hypot(other) }
+}
+
+/// The declared offset, before a zero: what differs from a zero by less is no fault. Without a declaration that of a usual sensor.
+fn offset_sigma(channel: Channel, config: &IdentifyConfig) -> f64 {
+    let declared = config.offsets_before_zero.get(&channel).copied();
+    let declared = declared.unwrap_or_else(|| config.sensor(channel).offset_sigma);
+    if declared > 0.0 { declared } else { usual_offset_sigma(channel) }
+}
+
+/// The first standstill in which a fault of this size moves a reading visibly.
+pub(crate) fn seen(rests: &[Rest], fault: &SensorFault, value: f64) -> Option<SeenAtRest> {
+    let shows = |rest: &&Rest| {
+        let effect = rest.rows.by_fault(fault);
+        let errors = rest.rows.covariance.diagonal();
+        effect.iter().zip(&errors).any(|(effect, error)| (effect * value).abs() > HINT_SIGMAS * error.sqrt())
+    };
+    rests.iter().find(shows).map(|rest| rest.seen)
+}

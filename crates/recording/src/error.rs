@@ -100,8 +100,8 @@ pub enum ReadWarning {
     UndefinedChannel { count: u64 },
     #[error("{topic} was left out: its messages are in encoding `{encoding}`, and only json can be read")]
     UnknownEncoding { topic: String, encoding: String },
-    #[error("{count} values of {channel} are not numbers; they count as missing")]
-    NotANumber { channel: Channel, count: u64 },
+    #[error("{count} values of {} are not numbers; they count as missing", symbols(channels))]
+    NotANumber { channels: Vec<Channel>, count: u64 },
     #[error("the rig marked {count} readings of {channel} as bad; they count as missing")]
     BadReadings { channel: Channel, count: u64 },
     #[error("the recording has no `{field}` on {topic}, which the channel map gives for {channel}")]
@@ -111,9 +111,10 @@ pub enum ReadWarning {
     )]
     UnitContradiction { channel: Channel, mapped: String, recorded: String },
     #[error(
-        "{channel}: {reordered} samples came out of order and {repeated} repeated a time; they were sorted and the repeats left out"
+        "{}: {reordered} samples came out of order and {repeated} repeated a time; they were sorted and the repeats left out",
+        symbols(channels)
     )]
-    OutOfOrder { channel: Channel, reordered: usize, repeated: usize },
+    OutOfOrder { channels: Vec<Channel>, reordered: usize, repeated: usize },
     /// Positive: forward.
     #[error("the clock was set by {by_s:+.1} s during the recording, or before it: the times were corrected")]
     ClockSet { by_s: f64 },
@@ -133,10 +134,8 @@ pub enum ReadWarning {
         "valve_command reverses in {turns_percent:.0} % of its samples, so it is a measured position; each step has the opening at its end"
     )]
     MeasuredValve { turns_percent: f64 },
-    #[error(
-        "the recording has neither step markers nor commands that change: {count} steps were found at jumps of {channels}"
-    )]
-    StepsFound { count: usize, channels: String },
+    #[error("{0}")]
+    StepsFound(StepsFound),
     #[error(
         "{channel} is a gauge pressure, and the ambient pressure is not in the recording: it was left out"
     )]
@@ -145,10 +144,6 @@ pub enum ReadWarning {
         "no steps were found: the recording has neither step markers nor a mapped P3_command or valve_command"
     )]
     NoCommands,
-    #[error(
-        "steps were found without {channel}: it is not in the recording, so the steps have no value of it"
-    )]
-    MissingCommand { channel: Channel },
     /// A gap in the readings is most of a step; `index` counts from 0.
     #[error(
         "step {} has no readings for {gap_s:.1} s of its {duration_s:.1} s, from {from_s:.1} s on: the log paused, or its clock was set; split the log there, or correct its times",
@@ -158,6 +153,71 @@ pub enum ReadWarning {
     /// `index` counts from 0; `end_s`: time of the last sample.
     #[error("step {} has no end: the run ended early, at {end_s} s", step_number(*index))]
     UnfinishedStep { index: usize, end_s: f64 },
+}
+
+fn symbols(channels: &[Channel]) -> String {
+    channels.iter().map(|channel| channel.symbol()).collect::<Vec<_>>().join(", ")
+}
+
+impl ReadWarning {
+    /// Adds the warning to others. What is true of several channels is one warning.
+    pub(crate) fn add_to(self, warnings: &mut Vec<ReadWarning>) {
+        let takes = |other: &mut ReadWarning| match (other, &self) {
+            (
+                ReadWarning::NotANumber { channels, count },
+                ReadWarning::NotANumber { channels: more, count: same },
+            ) if count == same => {
+                channels.extend(more);
+                true
+            }
+            (
+                ReadWarning::OutOfOrder { channels, reordered, repeated },
+                ReadWarning::OutOfOrder { channels: more, reordered: same, repeated: alike },
+            ) if (&*reordered, &*repeated) == (same, alike) => {
+                channels.extend(more);
+                true
+            }
+            _ => false,
+        };
+        if !warnings.iter_mut().any(takes) {
+            warnings.push(self);
+        }
+    }
+}
+
+/// The steps of a recording without markers, and which channels show them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepsFound {
+    /// Steps with a turning shaft.
+    pub count: usize,
+    /// Jumps that each channel shows, starts from rest included; commands first.
+    pub shown: Vec<(Channel, usize)>,
+    /// Starts that readings show, and recorded commands of P3 and valve do not, s.
+    pub only_readings_s: Vec<f64>,
+    /// Starts that commands show, and no reading does, s.
+    pub only_commands_s: Vec<f64>,
+}
+
+/// Longest list of times in a sentence. Bound: enough to find the cause.
+const MAX_LISTED: usize = 5;
+
+impl std::fmt::Display for StepsFound {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let shown: Vec<String> =
+            self.shown.iter().map(|(channel, count)| format!("{channel} {count}")).collect();
+        let (count, shown) = (self.count, shown.join(", "));
+        write!(f, "the recording has no step markers: {count} steps were found; jumps by channel: {shown}")?;
+        let apart = [
+            ("commands do not show, and readings do", &self.only_readings_s),
+            ("no reading follows the commands", &self.only_commands_s),
+        ];
+        for (what, times_s) in apart.into_iter().filter(|(_, times_s)| !times_s.is_empty()) {
+            let times: Vec<String> = times_s.iter().take(MAX_LISTED).map(|t_s| format!("{t_s:.0}")).collect();
+            let more = if times_s.len() > MAX_LISTED { " and later" } else { "" };
+            write!(f, "; {what} at {} s{more}", times.join(", "))?;
+        }
+        Ok(())
+    }
 }
 
 /// Kinds of damaged records.
@@ -184,5 +244,27 @@ impl std::fmt::Display for DamagedPart {
             DamagedPart::Metadata => "metadata whose lengths do not fit",
             DamagedPart::Attachment => "an attachment whose lengths or checksum do not fit",
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_true_of_several_channels_is_one_warning() {
+        let mut warnings = Vec::new();
+        for (channel, reordered) in [(Channel::T1, 3), (Channel::P1, 3), (Channel::T2, 1)] {
+            let channels = vec![channel];
+            ReadWarning::OutOfOrder { channels, reordered, repeated: 0 }.add_to(&mut warnings);
+        }
+        let channels: Vec<&[Channel]> = warnings
+            .iter()
+            .filter_map(|warning| match warning {
+                ReadWarning::OutOfOrder { channels, .. } => Some(channels.as_slice()),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(channels, [&[Channel::T1, Channel::P1][..], &[Channel::T2]]);
     }
 }

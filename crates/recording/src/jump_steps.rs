@@ -1,7 +1,6 @@
-//! Finds the steps of a recording without markers and commands: at jumps of speed, flow and pressures, and of a valve position that is mapped as the command.
+//! Finds jumps of speed, flow and pressures, and of a valve position that is mapped as the command: the steps of a recording without markers.
 
-use crate::ReadWarning;
-use mapper_core::{Channel, Group, JUMPS, Series, StepKind, StepMarker, jump_ratio};
+use mapper_core::{Channel, Group, JUMPS, Series, StepMarker, jump_ratio};
 use mapper_numerics::statistics::{self, nearest_rank};
 use std::collections::BTreeMap;
 
@@ -56,42 +55,23 @@ pub(crate) fn can_be_searched(series: &BTreeMap<Channel, Series>) -> bool {
     measured_jumps().any(|(channel, _)| series.get(&channel).is_some_and(|series| series.t_s.len() > 30))
 }
 
-/// Steps from jump to jump. The time before the first jump is the first step. A measured valve is evaluated too.
-pub(crate) fn steps_from_jumps(
+/// A jump of measured channels.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Jump {
+    pub(crate) start_s: f64,
+    /// The channels that show it.
+    pub(crate) channels: Vec<Channel>,
+}
+
+/// The jumps of the measured channels, in order, and the channels that were searched. A measured valve is evaluated too.
+pub(crate) fn find_jumps(
     series: &BTreeMap<Channel, Series>,
     measured_valve: bool,
-    warnings: &mut Vec<ReadWarning>,
-) -> Vec<StepMarker> {
+) -> (Vec<Jump>, Vec<Channel>) {
     let valve = measured_valve.then_some((Channel::ValveCommand, jump_ratio(Channel::ValveCommand)));
     let wanted: Vec<(Channel, f64)> = measured_jumps().chain(valve).collect();
     let grid = Grid::of(series, &wanted);
-    let (Some(first_s), Some(last_s)) = (grid.t_s.first().copied(), grid.t_s.last().copied()) else {
-        return Vec::new();
-    };
-    let starts_s: Vec<f64> = std::iter::once(first_s).chain(grid.jumps_s()).collect();
-    let ends_s = starts_s.iter().skip(1).map(|next_s| next_s - grid.interval_s).chain([last_s]);
-    let median_at_end = |channel: Channel, start_s: f64, end_s: f64| {
-        series.get(&channel).map_or(f64::NAN, |series| median(series, 0.5 * (start_s + end_s), end_s))
-    };
-    let steps: Vec<StepMarker> = starts_s
-        .iter()
-        .zip(ends_s)
-        .enumerate()
-        .map(|(index, (start_s, end_s))| StepMarker {
-            index,
-            kind: StepKind::Point,
-            start_s: *start_s,
-            end_s: end_s.max(*start_s),
-            from: None,
-            to: None,
-            p3_pa: median_at_end(Channel::P3, *start_s, end_s),
-            valve_opening_ratio: median_at_end(Channel::ValveCommand, *start_s, end_s),
-        })
-        .collect();
-    let channels: Vec<&str> = grid.signals.iter().map(|signal| signal.channel.symbol()).collect();
-    let turning = drop_rest_steps(steps.clone(), series).len();
-    warnings.push(ReadWarning::StepsFound { count: turning, channels: channels.join(", ") });
-    steps
+    (grid.jumps(), grid.signals.iter().map(|signal| signal.channel).collect())
 }
 
 /// Removes the steps in which the shaft is at rest: a soak before the first point, the end of a run. Renumbers the others.
@@ -183,10 +163,9 @@ impl Grid {
         ((time_s / self.interval_s).round() as usize).max(2)
     }
 
-    /// Start of each jump, s.
-    fn jumps_s(&self) -> Vec<f64> {
+    fn jumps(&self) -> Vec<Jump> {
         let (window, apart) = (self.point_count(WINDOW_S), self.point_count(SEPARATION_S));
-        let mut jumps_s = Vec::new();
+        let mut jumps = Vec::new();
         let mut last: Option<(usize, Vec<f64>)> = None;
         let mut at = window;
         while at + apart + window <= self.t_s.len() {
@@ -216,7 +195,13 @@ impl Grid {
                     && sizes.into_iter().all(|((_, size), whole)| size.abs() < SETTLING_SHARE * whole.abs())
             });
             if !settles {
-                jumps_s.extend(self.t_s.get(start));
+                let shows = |(signal, size): &(&Signal, &f64)| {
+                    let before = signal.mean(at - window, at);
+                    jumped(signal) || size.abs() > signal.min_jump(before, before + **size)
+                };
+                let showing = self.signals.iter().zip(&sizes).filter(shows);
+                let channels = showing.map(|(signal, _)| signal.channel).collect();
+                jumps.extend(self.t_s.get(start).map(|start_s| Jump { start_s: *start_s, channels }));
                 last = Some((start, sizes));
             }
             at = start + window;
@@ -227,7 +212,7 @@ impl Grid {
                 at += 1;
             }
         }
-        jumps_s
+        jumps
     }
 }
 
@@ -318,6 +303,8 @@ pub(crate) fn hold_at_step_ends(position: &mut Series, steps: &[StepMarker]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ReadWarning;
+    use crate::steps::find_steps;
 
     /// A shaft that follows jumps of its drive with a lag of two seconds, at 10 Hz, with noise of a fixed pattern.
     fn run(jumps: &[(f64, f64)], end_s: f64) -> BTreeMap<Channel, Series> {
@@ -333,7 +320,7 @@ mod tests {
     }
 
     fn starts(series: &BTreeMap<Channel, Series>) -> Vec<f64> {
-        let steps = drop_rest_steps(steps_from_jumps(series, false, &mut Vec::new()), series);
+        let steps = drop_rest_steps(find_steps(series, &[], false, &mut Vec::new()), series);
         assert!(
             steps.iter().enumerate().all(|(index, step)| step.index == index && step.end_s > step.start_s)
         );
@@ -348,6 +335,27 @@ mod tests {
         assert!(found.iter().zip(&jumps).all(|(found, (jump, _))| (found - jump).abs() <= 1.0), "{found:?}");
         let drift: Vec<(f64, f64)> = (0..240).map(|s| (f64::from(s), 90e3 + 20.0 * f64::from(s))).collect();
         assert_eq!(starts(&run(&drift, 240.0)), [0.0]);
+    }
+
+    /// The drive jumps at 60, 120 and 180 s, the recorded valve at 60 s alone.
+    #[test]
+    fn jumps_without_a_recorded_command_are_steps() {
+        let mut series = run(&[(0.0, 90e3), (60.0, 120e3), (120.0, 70e3), (180.0, 140e3)], 240.0);
+        let speed = series[&Channel::ShaftSpeed].clone();
+        let flow = speed.values.iter().map(|rpm| 1e-6 * rpm).collect();
+        series.insert(Channel::CompressorFlow, Series { values: flow, ..speed.clone() });
+        let valve = speed.t_s.iter().map(|t_s| if *t_s < 60.0 { 0.5 } else { 0.7 }).collect();
+        series.insert(Channel::ValveCommand, Series { values: valve, ..speed });
+        let mut warnings = Vec::new();
+        let steps = find_steps(&series, &[Channel::ValveCommand], false, &mut warnings);
+        let starts_s: Vec<f64> = steps.iter().map(|step| step.start_s.round()).collect();
+        assert_eq!(starts_s[..2], [0.0, 60.0]);
+        assert!((starts_s[2] - 120.0).abs() <= 1.0 && (starts_s[3] - 180.0).abs() <= 1.0, "{starts_s:?}");
+        let [ReadWarning::StepsFound(found)] = warnings.as_slice() else { panic!("{warnings:?}") };
+        assert_eq!(
+            found.shown,
+            [(Channel::ValveCommand, 1), (Channel::ShaftSpeed, 3), (Channel::CompressorFlow, 3)]
+        );
     }
 
     #[test]

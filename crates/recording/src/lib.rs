@@ -26,7 +26,7 @@ pub use channel_mapping::channel_map::{
     AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, WindowLimits,
 };
 pub use channel_mapping::channel_map_yaml::ChannelMapError;
-pub use error::{BatchError, DamagedPart, ReadWarning, RecordError};
+pub use error::{BatchError, DamagedPart, ReadWarning, RecordError, StepsFound};
 pub use mapper_yaml::Findings;
 pub use mapper_yaml::units::{Kind, Unit, UnitError};
 pub use mcap::chunk::ChunkError;

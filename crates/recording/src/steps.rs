@@ -1,6 +1,8 @@
-//! The steps of a recording: from its markers, or from changes of the commands.
+//! The steps of a recording: from its markers, or from changes of the commands and of the readings.
 
 use crate::ReadWarning;
+use crate::error::StepsFound;
+use crate::jump_steps::{Jump, can_be_searched, drop_rest_steps, find_jumps};
 use mapper_core::{
     Channel, Group, OperatingPoint, SLOW_JUMP_MULTIPLE, Series, StepKind, StepMarker, is_same_command,
     jump_ratio,
@@ -86,52 +88,102 @@ pub(crate) fn steps_from_markers(
     steps
 }
 
-/// Steps from changes of the commanded pressure and valve: each lasts from one jump to the next. The time before
-/// the first jump is the first step, so that a hold at the first point is its beginning.
-pub(crate) fn steps_from_commands(
+/// Time between a jump of the commands and one of the readings that are the same jump, s. Bound: a drive moves within some seconds, and means
+/// over three seconds, two apart, show it.
+const SAME_JUMP_S: f64 = 5.0;
+
+/// Fewest channels by which readings show a jump beside recorded commands. Bound: a single reading may be at fault.
+const FEWEST_SHOWING: usize = 2;
+
+/// Steps from jumps of the `commands` that mark steps and of the readings: each lasts from one jump to the next. The time before the first jump
+/// is the first step, so that a hold at the first point is its beginning. A jump of both begins with that of the commands.
+pub(crate) fn find_steps(
     series: &BTreeMap<Channel, Series>,
-    span_s: Option<(f64, f64)>,
+    commands: &[Channel],
+    measured_valve: bool,
     warnings: &mut Vec<ReadWarning>,
 ) -> Vec<StepMarker> {
-    let Some((first_s, last_s)) = span_s else { return Vec::new() };
-    let commands = [Channel::P3Command, Channel::ValveCommand].map(|channel| (channel, series.get(&channel)));
-    if commands.iter().all(|(_, command)| command.is_none()) {
+    let Some((first_s, last_s)) = span_s(series) else { return Vec::new() };
+    let is_searched = can_be_searched(series);
+    if commands.is_empty() && !is_searched {
         warnings.push(ReadWarning::NoCommands);
         return Vec::new();
     }
-    let missing = commands.iter().filter(|(_, command)| command.is_none());
-    warnings.extend(missing.map(|(channel, _)| ReadWarning::MissingCommand { channel: *channel }));
-
+    let command = |channel: Channel| series.get(&channel).filter(|_| commands.contains(&channel));
+    let (p3, valve) = (command(Channel::P3Command), command(Channel::ValveCommand));
+    let commanded = command_jumps(p3, valve);
+    let (measured, channels) =
+        if is_searched { find_jumps(series, measured_valve) } else { Default::default() };
+    let is_same = |jump: &Jump, (start_s, settled_s): &(f64, f64)| {
+        (start_s - SAME_JUMP_S..=settled_s + SAME_JUMP_S).contains(&jump.start_s)
+    };
+    let enough = if commands.is_empty() { 1 } else { FEWEST_SHOWING };
+    let only_measured = |jump: &&Jump| {
+        jump.channels.len() >= enough && !commanded.iter().any(|commanded| is_same(jump, commanded))
+    };
+    let of_readings: Vec<f64> = measured.iter().filter(only_measured).map(|jump| jump.start_s).collect();
     // Start of each step, and the time at which its commands have reached their values.
-    let mut jumps_s: Vec<(f64, f64)> = vec![(first_s, first_s)];
-    jumps_s.extend(find_jumps(commands[0].1, commands[1].1));
+    let mut jumps_s: Vec<(f64, f64)> = commanded.clone();
+    jumps_s.extend(of_readings.iter().map(|start_s| (*start_s, *start_s)));
+    jumps_s.push((first_s, first_s));
+    jumps_s.sort_by(|a, b| a.0.total_cmp(&b.0));
     let ends_s = jumps_s.iter().skip(1).map(|(start_s, _)| last_before_s(series, *start_s)).chain([last_s]);
-    jumps_s
-        .iter()
-        .zip(ends_s)
-        .enumerate()
-        .map(|(index, ((start_s, settled_s), end_s))| {
-            let command_value = |command: Option<&Series>| command.and_then(|c| held_number(c, *settled_s));
-            // For a rig without a P3 command: the P3 that it reached.
-            let reached = || {
-                let p3 = series.get(&Channel::P3)?;
-                median(p3.slice(0.5 * (start_s + end_s), end_s).1.iter().filter(|pa| pa.is_finite()))
+    let step = |(index, (&(start_s, settled_s), end_s)): (usize, (&(f64, f64), f64))| {
+        // Without a command: what the rig reached.
+        let value = |command: Option<&Series>, channel: Channel| match command {
+            Some(command) => held_number(command, settled_s),
+            None => median_number(series.get(&channel)?, 0.5 * (start_s + end_s), end_s),
+        };
+        StepMarker {
+            index,
+            kind: StepKind::Point,
+            start_s,
+            end_s: end_s.max(start_s),
+            from: None,
+            to: None,
+            p3_pa: value(p3, Channel::P3).unwrap_or(f64::NAN),
+            valve_opening_ratio: value(valve, Channel::ValveCommand).unwrap_or(f64::NAN),
+        }
+    };
+    let steps: Vec<StepMarker> = jumps_s.iter().zip(ends_s).enumerate().map(step).collect();
+    let unanswered =
+        |commanded: &&(f64, f64)| is_searched && !measured.iter().any(|jump| is_same(jump, commanded));
+    let unanswered: Vec<f64> = commanded.iter().filter(unanswered).map(|(start_s, _)| *start_s).collect();
+    let is_complete = p3.is_some() && valve.is_some();
+    if !is_complete || !of_readings.is_empty() || !unanswered.is_empty() {
+        let of_commands = [(Channel::P3Command, p3), (Channel::ValveCommand, valve)];
+        let shown_by_commands = of_commands.into_iter().filter_map(|(channel, command)| {
+            let command = command?;
+            let shown = if channel == Channel::P3Command {
+                command_jumps(Some(command), None)
+            } else {
+                command_jumps(None, Some(command))
             };
-            StepMarker {
-                index,
-                kind: StepKind::Point,
-                start_s: *start_s,
-                end_s,
-                from: None,
-                to: None,
-                p3_pa: commands[0]
-                    .1
-                    .map_or_else(reached, |_| command_value(commands[0].1))
-                    .unwrap_or(f64::NAN),
-                valve_opening_ratio: command_value(commands[1].1).unwrap_or(f64::NAN),
-            }
-        })
-        .collect()
+            Some((channel, shown.len()))
+        });
+        let shown_by_readings = channels.into_iter().map(|channel| {
+            (channel, measured.iter().filter(|jump| jump.channels.contains(&channel)).count())
+        });
+        warnings.push(ReadWarning::StepsFound(StepsFound {
+            count: drop_rest_steps(steps.clone(), series).len(),
+            shown: shown_by_commands.chain(shown_by_readings).collect(),
+            only_readings_s: if is_complete { of_readings } else { Vec::new() },
+            only_commands_s: unanswered,
+        }));
+    }
+    steps
+}
+
+/// Median of the numbers of a segment.
+fn median_number(series: &Series, start_s: f64, end_s: f64) -> Option<f64> {
+    median(series.slice(start_s, end_s).1.iter().filter(|value| value.is_finite()))
+}
+
+/// First and last time of all samples, s.
+pub(crate) fn span_s(series: &BTreeMap<Channel, Series>) -> Option<(f64, f64)> {
+    let first = series.values().filter_map(|s| s.t_s.first().copied()).reduce(f64::min)?;
+    let last = series.values().filter_map(|s| s.t_s.last().copied()).reduce(f64::max)?;
+    Some((first, last))
 }
 
 /// Steps that are mostly a gap in the readings: the log paused, or its clock was set at rest.
@@ -154,7 +206,7 @@ pub(crate) fn hollow_steps(
 }
 
 /// Start and end of each jump of the commands, s.
-fn find_jumps(p3: Option<&Series>, valve: Option<&Series>) -> Vec<(f64, f64)> {
+fn command_jumps(p3: Option<&Series>, valve: Option<&Series>) -> Vec<(f64, f64)> {
     let p3_changes = p3.map(find_changes).unwrap_or_default();
     let valve_changes = valve.map(find_changes).unwrap_or_default();
     let mut times_s: Vec<f64> = p3_changes.iter().chain(&valve_changes).map(|change| change.t_s).collect();
@@ -234,6 +286,8 @@ fn held_number(command: &Series, t_s: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
+    const COMMANDS: [Channel; 2] = [Channel::P3Command, Channel::ValveCommand];
+
     fn commands(rows: &[(f64, f64, f64)]) -> BTreeMap<Channel, Series> {
         let t_s: Vec<f64> = rows.iter().map(|row| row.0).collect();
         let column = |pick: fn(&(f64, f64, f64)) -> f64| Series {
@@ -308,7 +362,7 @@ mod tests {
             (50.0, 1.5e5, 0.7),
         ];
         let mut warnings = Vec::new();
-        let steps = steps_from_commands(&commands(&rows), Some((0.0, 50.0)), &mut warnings);
+        let steps = find_steps(&commands(&rows), &COMMANDS, false, &mut warnings);
         let found: Vec<_> =
             steps.iter().map(|s| (s.start_s, s.end_s, s.p3_pa, s.valve_opening_ratio)).collect();
         assert_eq!(found, [(0.0, 20.0, 1.5e5, 0.5), (20.0, 40.0, 2.0e5, 0.7), (40.0, 50.0, 1.5e5, 0.7)]);
@@ -322,7 +376,7 @@ mod tests {
         let mut rows = vec![(0.0, 1.5e5, 0.5)];
         rows.extend(trims);
         rows.extend([(39.9, 2.0e5, 0.7), (45.0, 2.001e5, 0.7), (60.0, 2.001e5, 0.7)]);
-        let steps = steps_from_commands(&commands(&rows), Some((0.0, 60.0)), &mut Vec::new());
+        let steps = find_steps(&commands(&rows), &COMMANDS, false, &mut Vec::new());
         let starts_s: Vec<_> = steps.iter().map(|step| step.start_s).collect();
         assert_eq!(starts_s, [0.0, 39.9]);
     }
@@ -333,7 +387,7 @@ mod tests {
         let mut rows = vec![(0.0, 1.5e5, 0.5)];
         rows.extend(ramp);
         rows.push((90.0, 1.8e5, 0.5));
-        let steps = steps_from_commands(&commands(&rows), Some((0.0, 90.0)), &mut Vec::new());
+        let steps = find_steps(&commands(&rows), &COMMANDS, false, &mut Vec::new());
         let found: Vec<_> = steps.iter().map(|step| (step.start_s, step.p3_pa)).collect();
         // The value at 20 s is the previous one.
         assert_eq!(found, [(0.0, 1.5e5), (20.5, 1.8e5)]);
@@ -342,7 +396,8 @@ mod tests {
     #[test]
     fn without_commands_there_are_no_steps_and_a_warning() {
         let mut warnings = Vec::new();
-        assert!(steps_from_commands(&BTreeMap::new(), Some((0.0, 1.0)), &mut warnings).is_empty());
+        let t1 = BTreeMap::from([(Channel::T1, Series { t_s: vec![0.0, 1.0], values: vec![298.0; 2] })]);
+        assert!(find_steps(&t1, &[], false, &mut warnings).is_empty());
         assert_eq!(warnings, [ReadWarning::NoCommands]);
     }
 }

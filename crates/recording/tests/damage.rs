@@ -261,8 +261,8 @@ fn times_out_of_order_are_sorted_and_repeats_left_out() {
     let ambient = &report.recording.series[&Channel::TAmb];
     assert_eq!((&ambient.t_s[..], &ambient.values[..]), (&[0.0, 3.0][..], &[298.15, 298.15][..]));
     for expected in [
-        ReadWarning::OutOfOrder { channel: Channel::T2, reordered: 1, repeated: 1 },
-        ReadWarning::NotANumber { channel: Channel::T2, count: 1 },
+        ReadWarning::OutOfOrder { channels: vec![Channel::T2], reordered: 1, repeated: 1 },
+        ReadWarning::NotANumber { channels: vec![Channel::T2], count: 1 },
         ReadWarning::DamagedMessages { topic: "/daq".to_owned(), count: 1 },
         ReadWarning::NoCommands,
     ] {

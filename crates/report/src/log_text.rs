@@ -2,7 +2,7 @@
 
 use crate::document::{Document, Table};
 use mapper_recording::logs::proposal::{Ambient, Certainty, Proposal};
-use mapper_recording::logs::{Layout, Survey, sparkline};
+use mapper_recording::logs::{Layout, Restart, Survey, sparkline};
 
 /// Width of a trace, characters.
 const TRACE: usize = 20;
@@ -26,9 +26,10 @@ pub fn log_contents(format: &str, layout: &Layout, survey: &Survey, proposal: &P
         } else {
             String::new()
         };
-        let backward = match data.backward {
-            0 => String::new(),
-            rows => format!("; {rows} rows are not after the row before"),
+        let backward = match (data.restart, data.backward) {
+            // Its own sentence says more.
+            (Some(_), _) | (None, 0) => String::new(),
+            (None, rows) => format!("; {rows} rows are not after the row before"),
         };
         let gaps = match data.gap_count {
             0 => "no gaps.".to_owned(),
@@ -36,8 +37,13 @@ pub fn log_contents(format: &str, layout: &Layout, survey: &Survey, proposal: &P
             count => format!("{count} gaps:"),
         };
         document.text(format!(
-            "{name}: {} from {:.3} s to {:.3} s{rate}{backward}, {gaps}",
-            data.rows, data.first_s, data.last_s
+            "{name}: {} from {:.3} s to {}{:.3} s{rate}{backward}, {gaps}",
+            data.rows,
+            data.first_s,
+            data.restart.map_or_else(String::new, |Restart { from_s, to_s, .. }| {
+                format!("{from_s:.3} s, and again from {to_s:.3} s to ")
+            }),
+            data.last_s
         ));
         document.text(data.restart.map_or_else(String::new, |restart| restart.describe("")));
         document.list(

@@ -4,16 +4,14 @@ use crate::channel_mapping::channel_map_yaml::MapMistakes;
 use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of, sources};
 use crate::channel_mapping::plausibility;
 use crate::channel_mapping::plausibility::Readings;
-use crate::jump_steps::{
-    can_be_searched, drop_rest_steps, hold_at_step_ends, reversal_share, steps_from_jumps,
-};
+use crate::jump_steps::{drop_rest_steps, hold_at_step_ends, reversal_share};
 use crate::logs::{LogError, LogFile};
 use crate::reading::log_reader::{is_mcap, log_of_path, read_log};
 use crate::reading::scan::{ReadOptions, ScanResult, scan};
 use crate::samples::clock_steps::{repair_gaps, repair_set_back, repair_set_forward};
 use crate::samples::rig_sink::{PositionedMessage, RigSink};
 use crate::samples::series_builder::{SeriesBuilder, run_time_s};
-use crate::steps::{hollow_steps, steps_from_commands, steps_from_markers};
+use crate::steps::{find_steps, hollow_steps, span_s, steps_from_markers};
 use crate::writing::recording_file::OriginMessage;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError};
 use mapper_core::unit_factors::PERCENT;
@@ -374,28 +372,27 @@ fn drop_bad_readings(
     }
 }
 
-/// Steps from commands, or else from jumps of measured channels.
+/// Steps from jumps of commands and measured channels.
 fn detect_steps(
     map: &ChannelMap,
     series: &mut BTreeMap<Channel, Series>,
     warnings: &mut Vec<ReadWarning>,
 ) -> Vec<StepMarker> {
-    if let Some(share) = series.get(&Channel::ValveCommand).and_then(reversal_share) {
-        warnings.push(ReadWarning::MeasuredValve { turns_percent: PERCENT * share });
-        let steps = steps_from_jumps(series, true, warnings);
-        if let Some(position) = series.get_mut(&Channel::ValveCommand) {
-            hold_at_step_ends(position, &steps);
-        }
-        return drop_rest_steps(steps, series);
+    let turns = series.get(&Channel::ValveCommand).and_then(reversal_share);
+    warnings.extend(turns.map(|share| ReadWarning::MeasuredValve { turns_percent: PERCENT * share }));
+    // Neither a position nor a constant command marks steps.
+    let marks = |channel: &Channel| {
+        series.contains_key(channel)
+            && !map.constants.contains_key(channel)
+            && (turns.is_none() || *channel != Channel::ValveCommand)
+    };
+    let commands: Vec<Channel> =
+        [Channel::P3Command, Channel::ValveCommand].into_iter().filter(marks).collect();
+    let steps = find_steps(series, &commands, turns.is_some(), warnings);
+    if let Some(position) = series.get_mut(&Channel::ValveCommand).filter(|_| turns.is_some()) {
+        hold_at_step_ends(position, &steps);
     }
-    let span_s = span_s(series);
-    // A constant command does not mark steps.
-    let moves = |channel: &Channel| series.contains_key(channel) && !map.constants.contains_key(channel);
-    let commanded = [Channel::P3Command, Channel::ValveCommand].iter().any(moves);
-    if commanded || !can_be_searched(series) {
-        return drop_rest_steps(steps_from_commands(series, span_s, warnings), series);
-    }
-    drop_rest_steps(steps_from_jumps(series, false, warnings), series)
+    drop_rest_steps(steps, series)
 }
 
 /// Adds the readings of channels of which the recording has only single sensors, at the times of the first sensor, as the rig would have
@@ -427,13 +424,6 @@ fn combine_sensors(
         let together = Series { t_s: first.t_s.clone(), values: first.t_s.iter().map(at).collect() };
         series.insert(channel, together);
     }
-}
-
-/// First and last time of all samples, s.
-fn span_s(series: &BTreeMap<Channel, Series>) -> Option<(f64, f64)> {
-    let first = series.values().filter_map(|s| s.t_s.first().copied()).reduce(f64::min)?;
-    let last = series.values().filter_map(|s| s.t_s.last().copied()).reduce(f64::max)?;
-    Some((first, last))
 }
 
 /// A constant value over the whole recording.

@@ -211,7 +211,8 @@ impl SeriesBuilder {
     /// The series over run time, strictly increasing; of samples at the same time the first one is kept.
     pub(crate) fn build(self, channel: Channel, zero_ns: u64, warnings: &mut Vec<ReadWarning>) -> Series {
         if self.non_numeric_count > 0 {
-            warnings.push(ReadWarning::NotANumber { channel, count: self.non_numeric_count });
+            let channels = vec![channel];
+            ReadWarning::NotANumber { channels, count: self.non_numeric_count }.add_to(warnings);
         }
         let (times_ns, values) = if self.times_ns.is_sorted_by(|a, b| a < b) {
             (self.times_ns, self.values)
@@ -222,7 +223,7 @@ impl SeriesBuilder {
             samples.sort_by_key(|(time_ns, _)| *time_ns);
             samples.dedup_by_key(|(time_ns, _)| *time_ns);
             let repeated = before - samples.len();
-            warnings.push(ReadWarning::OutOfOrder { channel, reordered, repeated });
+            ReadWarning::OutOfOrder { channels: vec![channel], reordered, repeated }.add_to(warnings);
             samples.into_iter().unzip()
         };
         Series { t_s: times_ns.into_iter().map(|time_ns| run_time_s(time_ns, zero_ns)).collect(), values }

@@ -16,6 +16,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod allowance;
+mod blade_count;
 mod config;
 mod estimates;
 mod evidence;
@@ -31,6 +32,7 @@ mod single_step;
 mod step_data;
 mod step_outcome;
 
+pub use blade_count::{BladeCount, blade_count};
 pub use config::{
     Allowance, DeclaredUncertainty, Housing, IdentifyConfig, NoiseColour, PressureTap, Thresholds,
 };

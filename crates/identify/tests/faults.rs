@@ -6,9 +6,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 #![allow(clippy::print_stdout, reason = "the table is what a person looks at who changes a balance")]
 
-use crate::lab::{Machine as LabMachine, campaign, measured};
+use crate::lab::{Machine as LabMachine, campaign, eighteen, measured};
 use mapper_core::{Channel, FaultKind, Method, ModelTolerances, Recording, Verdict};
-use mapper_identify::{Identified, IdentifyConfig, Machine, NominalRig, Suspect, identify_recording};
+use mapper_identify::{
+    Identified, IdentifyConfig, Machine, NominalRig, Suspect, blade_count, identify_recording,
+};
 use mapper_physics::rig::sensor_fault::{Rest, additive};
 use mapper_physics::simulation::model::Model;
 use rand::seq::SliceRandom;
@@ -214,4 +216,34 @@ fn faults_are_found_and_named_and_none_is_invented() {
     // A fault of 6 standard errors scatters by one, and some 4.5 are needed: 95 of 100 are found. Of 24, three more are missed by chance once
     // in a hundred.
     assert!(found >= 85.0 && named >= 75.0, "{found:.0} % found, {named:.0} % named");
+}
+
+/// A sensor that is set to seven blades on a wheel with six reads six sevenths of every speed. The map shows it, and so does the grid alone.
+#[test]
+fn a_wrong_number_of_blades_is_found_and_the_right_one_is_none() {
+    let points = eighteen();
+    let mut recording = campaign(&points, 60.0, LabMachine::default()).recording;
+    let grid_rpm: Vec<f64> = points.iter().map(|(_, speed_rpm)| *speed_rpm).collect();
+    let map = Model::nominal().map;
+    let config = IdentifyConfig { method: Method::Steady, ..IdentifyConfig::default() };
+    for (blades, set) in [(7, 7), (6, 7), (5, 6), (8, 7)] {
+        let mut read = recording.clone();
+        let speed = read.series.get_mut(&Channel::ShaftSpeed).unwrap();
+        speed.values.iter_mut().for_each(|rpm| *rpm *= f64::from(blades) / f64::from(set));
+        let points: Vec<_> =
+            identify_recording(&read, &config, None).unwrap().points.into_iter().flatten().collect();
+        let by = |grid_rpm: &[f64], map| {
+            let found = blade_count(&points, config.reference, grid_rpm, map)?;
+            Some((found.blades as i32, found.set as i32))
+        };
+        let expected = (blades != set).then_some((blades, set));
+        assert_eq!(by(&[], Some(map.as_ref())), expected, "map");
+        assert_eq!(by(&grid_rpm, None), expected, "grid");
+    }
+    // Half of the speeds are no blades.
+    let speed = recording.series.get_mut(&Channel::ShaftSpeed).unwrap();
+    speed.values.iter_mut().for_each(|rpm| *rpm *= 0.5);
+    let points: Vec<_> =
+        identify_recording(&recording, &config, None).unwrap().points.into_iter().flatten().collect();
+    assert_eq!(blade_count(&points, config.reference, &grid_rpm, Some(map.as_ref())), None);
 }

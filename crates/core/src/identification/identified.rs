@@ -360,6 +360,8 @@ ResultRemark {
     "cell_contradicts" CellContradicts { channel: Channel, reading: f64, reference: f64, common_sigma: f64 },
     /// A sensor has a periodic error at rest, amplitude in the channel's unit: pick-up that the sampling folds to a low frequency.
     "periodic_error" PeriodicError { channel: Channel, period_s: f64, amplitude: f64 },
+    /// All speeds are those of the declared map or grid times `blades`/`set`: the speed sensor may be set to a wrong number of blades.
+    "blade_count" BladeCount { blades: usize, set: usize },
     /// The points are corrected for a cause that the diagnosis names.
     "corrected" Corrected { causes: Vec<String>, probability: f64 },
     /// The intervals contain what causes of a gap would change for which the points are not corrected; largest standard uncertainty of an

@@ -5,6 +5,7 @@ use mapper_core::{Channel, ModelTolerances};
 use mapper_numerics::ROUNDING;
 use mapper_numerics::polyline::NearestOnPolyline;
 use mapper_numerics::root::bisect;
+use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
 use mapper_physics::simulation::model::Model;
 use std::collections::BTreeMap;
 
@@ -29,6 +30,19 @@ const PLACES: usize = 200;
 /// Extension beyond the surge point, share of the line's PR - 1. Bound: a rig may reach further than its map.
 const BEYOND_SURGE: f64 = 0.03;
 
+/// Corrected speed at which a map has a corrected flow at a pressure ratio, rpm; `None` if there is none near the measured one.
+pub(crate) fn map_speed_rpm(
+    map: &dyn CompressorCharacteristic,
+    flow_kg_s: f64,
+    pressure_ratio: f64,
+    measured_rpm: f64,
+) -> Option<f64> {
+    let missing_kg_s = |rpm: f64| map.evaluate(rpm, pressure_ratio).flow_corrected_kg_s - flow_kg_s;
+    let (low, high) = (SPEEDS.0 * measured_rpm, SPEEDS.1 * measured_rpm);
+    (low > 0.0 && missing_kg_s(low) < 0.0 && missing_kg_s(high) > 0.0).then_some(())?;
+    Some(bisect(low, high, ROUNDING * measured_rpm, |rpm| missing_kg_s(rpm) < 0.0).0)
+}
+
 impl NominalRig<'_> {
     /// Physical speed at which the map has a point's flow and pressure ratio, rpm; `None` if there is none near the measured speed.
     pub(crate) fn speed_rpm(&self, readings: &Readings) -> Option<f64> {
@@ -37,14 +51,9 @@ impl NominalRig<'_> {
         let flow_kg_s =
             reference.corrected_flow_kg_s(readings.dry_flow_kg_s(), readings.t1_k(), readings.p1_pa());
         let ratio = readings.p2_pa() / readings.p1_pa();
-        let missing_kg_s = |speed_rpm: f64| {
-            let corrected_rpm = reference.corrected_speed_rpm(speed_rpm, readings.t1_k());
-            map.evaluate(corrected_rpm, ratio).flow_corrected_kg_s - flow_kg_s
-        };
-        let speed_rpm = readings.speed_rpm();
-        let (low, high) = (SPEEDS.0 * speed_rpm, SPEEDS.1 * speed_rpm);
-        (low > 0.0 && missing_kg_s(low) < 0.0 && missing_kg_s(high) > 0.0).then_some(())?;
-        Some(bisect(low, high, ROUNDING * speed_rpm, |speed_rpm| missing_kg_s(speed_rpm) < 0.0).0)
+        let measured_rpm = reference.corrected_speed_rpm(readings.speed_rpm(), readings.t1_k());
+        let corrected_rpm = map_speed_rpm(map, flow_kg_s, ratio, measured_rpm)?;
+        Some(reference.physical_speed_rpm(corrected_rpm, readings.t1_k()))
     }
 
     /// Efficiency of the map at the nearest position of the speed line. Also its slope along the line, per unit of the line's largest flow and

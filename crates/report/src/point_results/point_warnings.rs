@@ -142,6 +142,10 @@ impl Message for ResultRemark {
                 significant_digits(*amplitude, 2),
                 channel.unit()
             ),
+            ResultRemark::BladeCount { blades, set } => format!(
+                "all speeds are {blades}/{set} of those of the declared map or of the grid: is the speed sensor set to the right number of blades? \
+                 For a wheel with {blades} blades it must not count {set}; correct it there, or the column, and check `sensors: N: {{blades: ...}}`"
+            ),
             ResultRemark::Corrected { causes, probability } => format!(
                 "corrected for {}, which the diagnosis of this recording names with {}: without this correction the efficiencies differ",
                 causes.join(" + "),

@@ -16,8 +16,8 @@ use mapper_core::{
 };
 use mapper_diagnose::gap::PointCorrection;
 use mapper_identify::{
-    CellReference, DynamicEfficiency, FittedReadings, FoundFault, IdentifyConfig, IsothermalZero, NominalRig,
-    PeriodicError, ZeroOutcome, ZeroSettings, identify_recording, isothermal_zero, method_for,
+    BladeCount, CellReference, DynamicEfficiency, FittedReadings, FoundFault, IdentifyConfig, IsothermalZero, NominalRig,
+    PeriodicError, ZeroOutcome, ZeroSettings, blade_count, identify_recording, isothermal_zero, method_for,
     with_measured_humidity,
 };
 use mapper_maps::{AssembleError, RepeatedJump, assemble, repeated_jumps};
@@ -257,7 +257,11 @@ impl Session<'_> {
         let (recording, origins) = join_recordings(fused.recordings.into_iter().map(off).collect());
         let config = with_measured_humidity(&recording, &config);
         let declared = campaign.filter(|campaign| campaign.tolerances_declared);
-        let mut model = declared.map(nominal_model).transpose()?;
+        let mut model = match declared {
+            Some(campaign) => Some(nominal_model(campaign)?),
+            // It only shows the scale of the speeds.
+            None => campaign.and_then(|campaign| nominal_model(campaign).ok()),
+        };
         model.iter_mut().for_each(|model| take_air_and_probe(model, &config));
         let nominal = declared.zip(model.as_ref());
         let conditions = campaign.map(declared_conditions).unwrap_or_default();
@@ -269,6 +273,10 @@ impl Session<'_> {
         let identified = identify_recording(&recording, &config, nominal)?;
         let mut points: Vec<IdentifiedPoint> = identified.points.into_iter().filter_map(Result::ok).collect();
         if let Some(campaign) = campaign {
+            let grid_rpm: Vec<f64> = campaign.points.iter().map(|point| point.speed_rpm).collect();
+            let map = model.as_ref().map(|model| model.map.as_ref());
+            let count = blade_count(&points, config.reference, &grid_rpm, map);
+            remarks.extend(count.map(|BladeCount { blades, set }| ResultRemark::BladeCount { blades, set }));
             warn_about_calibrations(&mut points, &recording, campaign, day);
         }
         for point in &points {

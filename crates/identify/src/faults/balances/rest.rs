@@ -11,7 +11,7 @@ use crate::isothermal_zero::zero::{AtRest, all_at_rest};
 use mapper_core::{Channel, FaultKind, Recording, SeenAtRest};
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, HINT_SIGMAS};
 use mapper_observe::declared::usual_offset_sigma;
-use mapper_physics::rig::sensor_fault::{SensorFault, gain_error};
+use mapper_physics::rig::sensor_fault::SensorFault;
 use nalgebra::DMatrix;
 
 /// What a group of sensors reads in a standstill.
@@ -56,7 +56,7 @@ fn rest(at_rest: &AtRest, config: &IdentifyConfig, (first_s, last_s): (f64, f64)
     let readings = Readings {
         values: CHANNELS.map(value),
         run_ratio: ((end_s - first_s) / (last_s - first_s)).clamp(0.0, 1.0),
-        rest_pressure_pa: config.rest_pressure_pa,
+        rest: config.rest,
         air: config.air,
     };
     let count = others.len();
@@ -65,7 +65,8 @@ fn rest(at_rest: &AtRest, config: &IdentifyConfig, (first_s, last_s): (f64, f64)
         (channel, FaultKind::Offset, others.iter().map(|other| by(other, channel)).collect::<Vec<f64>>())
     });
     // Gas and wall have one temperature.
-    let no_conduction = (Channel::T2, FaultKind::TowardsWall, vec![0.0; count]);
+    let no_conduction =
+        [Channel::T1, Channel::T2].map(|channel| (channel, FaultKind::TowardsWall, vec![0.0; count]));
     Some(Rest {
         rows: Rows {
             residual: others.iter().map(|other| other.value - first.value).collect(),
@@ -77,7 +78,7 @@ fn rest(at_rest: &AtRest, config: &IdentifyConfig, (first_s, last_s): (f64, f64)
                 .map(|other| -> PerChannel { CHANNELS.map(|channel| by(other, channel)) })
                 .collect(),
             by_machine: Vec::new(),
-            by_fault: offsets.chain([no_conduction]).collect(),
+            by_fault: offsets.chain(no_conduction).collect(),
         },
         seen: SeenAtRest { start_s, end_s, is_soak: at_rest.is_soak },
     })
@@ -87,7 +88,7 @@ fn member(reading: &Reading, config: &IdentifyConfig) -> Member {
     let Reading { channel, mean, own, .. } = *reading;
     let declared = config.sensor(channel);
     let is_parameter = CHANNELS.contains(&channel) && declared.offset_sigma == offset_sigma(channel, config);
-    let gain = declared.gain_sigma_ratio * gain_error(channel, mean, config.rest_pressure_pa);
+    let gain = declared.gain_sigma_ratio * config.rest.gain_error(channel, mean);
     let other = if is_parameter { 0.0 } else { offset_sigma(channel, config).hypot(gain) };
     Member { channel: Some(channel), value: mean, sigma: own.hypot(other) }
 }

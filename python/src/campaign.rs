@@ -3,7 +3,7 @@
 use crate::attended::compute;
 use crate::error::Fault;
 use crate::plugins::plugins;
-use mapper_core::NAMED_REFERENCES;
+use mapper_maps::table::parse_reference;
 use mapper_session::{FirstCampaignRequest, FirstRig, SessionError, first_campaign};
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -101,7 +101,7 @@ fn plan_json(campaign: &mapper::Campaign, effort: f64) -> Result<Value, Fault> {
 
 /// Writes the first campaign of a machine and its nominal map, as `mapper init` does. Returns the JSON of that command.
 #[pyfunction]
-#[pyo3(signature = (name, directory, rig, wheel_diameter_m, map=None, reference="SAE"))]
+#[pyo3(signature = (name, directory, rig, wheel_diameter_m, map=None, reference=None))]
 pub fn write_template(
     py: Python<'_>,
     name: String,
@@ -109,7 +109,7 @@ pub fn write_template(
     rig: &str,
     wheel_diameter_m: f64,
     map: Option<PathBuf>,
-    reference: &str,
+    reference: Option<&str>,
 ) -> PyResult<String> {
     let rig = match rig {
         "virtual_lab" => FirstRig::VirtualLab,
@@ -121,10 +121,8 @@ pub fn write_template(
             return Err(Fault::Argument(message).into());
         }
     };
-    let reference = NAMED_REFERENCES
-        .iter()
-        .find(|row| row.name.eq_ignore_ascii_case(reference))
-        .ok_or_else(|| Fault::Argument(format!("`{reference}` is not one of SAE, Garrett, BorgWarner")))?;
+    let reference = reference.map(parse_reference).transpose();
+    let reference = reference.map_err(|error| Fault::Argument(error.to_string()))?;
     let request = FirstCampaignRequest {
         name,
         directory,

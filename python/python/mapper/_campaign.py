@@ -94,7 +94,7 @@ class Campaign:
         name: str = "my_turbo",
         directory: str | os.PathLike[str] | None = None,
         map: str | os.PathLike[str] | None = None,
-        reference: str = "SAE",
+        reference: str | None = None,
     ) -> Campaign:
         """Make the first campaign of a machine, as ``mapper init`` does.
 
@@ -111,7 +111,7 @@ class Campaign:
         map
             The machine's own map; that of a similar compressor by default.
         reference
-            Reference state of map and results: ``SAE``, ``Garrett`` or ``BorgWarner``.
+            Reference state of map and results: ``SAE``, ``Garrett``, ``BorgWarner`` or ``"T, P"``; that of the map's file by default.
 
         Raises
         ------

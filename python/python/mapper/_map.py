@@ -211,7 +211,7 @@ class Map:
         return f"<p>{self!r}</p>{self.to('svg').decode()}"
 
 
-def reduce(measured: pd.DataFrame, *, reference: str) -> Map:
+def reduce(measured: pd.DataFrame, *, reference: str | None = None) -> Map:
     """Reduce steady measured points to a map, as the map reader does with a file that has these columns.
 
     Parameters
@@ -220,7 +220,7 @@ def reduce(measured: pd.DataFrame, *, reference: str) -> Map:
         One row per point. Columns are named as in map files, with units: ``N [rpm]``, ``m [kg/s]``, ``P1 [kPa]``, ``T1 [degC]``,
         ``P2 [kPa]``, ``T2 [degC]``. Efficiencies of temperatures are apparent, heat transfer included.
     reference
-        Reference state of corrected flow and speed: ``SAE``, ``Garrett``, ``BorgWarner`` or ``"T, P"``.
+        Reference state of corrected flow and speed: ``SAE``, ``Garrett``, ``BorgWarner`` or ``"T, P"``; ``SAE`` by default.
 
     Raises
     ------

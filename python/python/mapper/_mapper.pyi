@@ -72,7 +72,7 @@ class Map:
     def at_reference(self, reference: str) -> Map: ...
 
 def write_template(
-    name: str, directory: Path, rig: str, wheel_diameter_m: float, map: Path | None = None, reference: str = "SAE"
+    name: str, directory: Path, rig: str, wheel_diameter_m: float, map: Path | None = None, reference: str | None = None
 ) -> str: ...
 def run(
     campaign: Campaign,

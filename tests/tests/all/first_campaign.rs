@@ -133,6 +133,31 @@ fn a_suppliers_map_is_converted() {
     }
 }
 
+/// The reference state of a map's file is that of the campaign, without or with the same statement; another statement is a mistake.
+#[test]
+fn a_maps_own_reference_state_counts() {
+    let scratch = scratch();
+    let of = |name: &str, further: &[&str]| {
+        let all = ["init", name, "--wheel", "60mm"].into_iter().chain(further.iter().copied());
+        mapper_in(scratch.path(), all.collect::<Vec<_>>())
+    };
+    let state_of = |name: &str| {
+        let file = format!("{name}.yaml");
+        mapper_in(scratch.path(), ["check", &file]).exits(0);
+        let text = std::fs::read_to_string(scratch.path().join(file)).unwrap();
+        text.lines().find(|line| line.starts_with("reference:")).unwrap().to_owned()
+    };
+    let (stated, kelvin) = ("298.15 K, 100 kPa", "298.15 K");
+    of("first", &["--reference", stated]).exits(0);
+    assert!(state_of("first").contains(kelvin));
+    let table = std::fs::read_to_string(scratch.path().join("first_map.csv")).unwrap();
+    std::fs::write(scratch.path().join("map.csv"), format!("# reference: {stated}\n{table}")).unwrap();
+    of("second", &["--map", "map.csv"]).exits(0);
+    assert!(state_of("second").contains(kelvin));
+    of("third", &["--map", "map.csv", "--reference", stated]).exits(0);
+    assert_ne!(of("fourth", &["--map", "map.csv", "--reference", "BorgWarner"]).code, Some(0));
+}
+
 /// Changes the speed, flow, pressure ratio and efficiency of a row.
 type Change = fn([f64; 4]) -> [f64; 4];
 

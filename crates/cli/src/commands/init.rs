@@ -1,11 +1,11 @@
 //! `mapper init`.
 
+use crate::command_line::reference;
 use crate::environment::registry;
 use crate::output::failure::{Code, Failure};
 use crate::output::standard_output;
 use clap::{Args, ValueEnum};
 use mapper_campaign::units::{Kind, parse};
-use mapper_core::{NAMED_REFERENCES, NamedReference};
 use mapper_session::{FirstCampaignRequest, FirstRig, first_campaign};
 use std::io::{BufRead, IsTerminal, Read};
 use std::path::PathBuf;
@@ -39,9 +39,9 @@ pub struct Init {
     /// The machine's own map, in any layout that `mapper map inspect` understands
     #[arg(long, value_name = "FILE")]
     pub map: Option<PathBuf>,
-    /// Reference state of the map and the results: SAE, Garrett, BorgWarner
-    #[arg(long, value_name = "NAME", default_value = "SAE", value_parser = parse_reference)]
-    pub reference: &'static NamedReference,
+    /// Reference state of the map and the results: SAE, Garrett, BorgWarner or "T, P"; that of the map's file if not given, or else SAE
+    #[arg(long, value_name = "STATE")]
+    pub reference: Option<String>,
     /// Lowest and highest corrected speed, e.g. 45krpm 140krpm; those of the map if they are not given
     #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], value_parser = parse_speed_rpm)]
     pub speeds: Vec<f64>,
@@ -88,7 +88,7 @@ impl Init {
             has_static_taps: self.static_taps,
             probe_diameter_m: self.probe,
             map: self.map.clone(),
-            reference: self.reference,
+            reference: reference(self.reference.as_deref())?,
             speeds_rpm: match self.speeds.as_slice() {
                 [low, high] if low < high => Some((*low, *high)),
                 [] => None,
@@ -138,9 +138,4 @@ fn parse_length_m(text: &str) -> Result<f64, String> {
 
 fn parse_speed_rpm(text: &str) -> Result<f64, String> {
     parse_quantity(Kind::Speed, text)
-}
-
-fn parse_reference(name: &str) -> Result<&'static NamedReference, String> {
-    let known = NAMED_REFERENCES.iter().find(|row| row.name.eq_ignore_ascii_case(name));
-    known.ok_or_else(|| "it is not one of SAE, Garrett, BorgWarner".to_owned())
 }

@@ -16,9 +16,9 @@ use mapper_core::{
 };
 use mapper_diagnose::gap::PointCorrection;
 use mapper_identify::{
-    BladeCount, CellReference, DynamicEfficiency, FittedReadings, FoundFault, IdentifyConfig, IsothermalZero, NominalRig,
-    PeriodicError, ZeroOutcome, ZeroSettings, blade_count, identify_recording, isothermal_zero, method_for,
-    with_measured_humidity,
+    BladeCount, CellReference, DynamicEfficiency, FittedReadings, FoundFault, IdentifyConfig, IsothermalZero,
+    NominalRig, PeriodicError, ZeroOutcome, ZeroSettings, blade_count, identify_recording, isothermal_zero,
+    method_for, with_measured_humidity,
 };
 use mapper_maps::{AssembleError, RepeatedJump, assemble, repeated_jumps};
 use mapper_observe::FusedChannel;

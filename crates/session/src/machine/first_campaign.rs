@@ -9,7 +9,7 @@ use mapper_campaign::{
     similar_sizes,
 };
 use mapper_chart::efficiency_mesh::{InterpolatedLine, SUBDIVISIONS, interpolated_lines};
-use mapper_core::{NamedReference, ReferenceState, one_line};
+use mapper_core::{ImportError, NAMED_REFERENCES, ReferenceState, one_line};
 use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
 use mapper_physics::compressor_map::closed_form_map::{ClosedFormMap, TURBO_A_WHEEL_M};
 use mapper_report::significant_digits;
@@ -94,10 +94,7 @@ pub fn first_campaign(
     }
     write_new(&map_path, map.text.as_bytes())?;
     if let Some(path) = &channels {
-        write_new(
-            path,
-            fill_template(CHANNELS, &[("reference", request.reference.name.to_owned())]).as_bytes(),
-        )?;
+        write_new(path, fill_template(CHANNELS, &[("reference", reference_yaml(map.reference))]).as_bytes())?;
     }
     // The campaign comes last, because it refers to the other files.
     write_new(&campaign_path, text.as_bytes())?;
@@ -153,7 +150,7 @@ fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
         ),
         ("geometry", geometry(request, map)),
         ("map_file", map.file_name.clone()),
-        ("reference", request.reference.name.to_owned()),
+        ("reference", reference_yaml(map.reference)),
         ("flow_noise", significant_digits(FLOW_NOISE_KG_S * wheel_ratio * wheel_ratio, 2)),
         ("inlet_tap", tap(request.inlet_diameter_m, "compressor.inlet_diameter")),
         ("outlet_tap", tap(request.outlet_diameter_m, "compressor.outlet_diameter")),
@@ -309,8 +306,8 @@ pub struct FirstCampaignRequest {
     pub probe_diameter_m: Option<f64>,
     /// The machine's own map; that of a similar compressor if `None`.
     pub map: Option<PathBuf>,
-    /// Reference state of the map and of the results.
-    pub reference: &'static NamedReference,
+    /// Reference state of the map and of the results; if `None`, that of the map's file, or else SAE.
+    pub reference: Option<ReferenceState>,
     /// Lowest and highest corrected speed, rpm; those of the map if `None`.
     pub speeds_rpm: Option<(f64, f64)>,
 }
@@ -328,6 +325,16 @@ const LINE_STRIDE: usize = SUBDIVISIONS / 4;
 /// Points of a line in the table of a similar compressor. They are densest near surge, where the flow changes most with pressure.
 const POINTS_PER_LINE: usize = 13;
 
+/// A reference state as campaigns and channel maps have it.
+fn reference_yaml(state: ReferenceState) -> String {
+    let named = NAMED_REFERENCES.iter().find(|row| row.state == state);
+    let ReferenceState { t_ref_k, p_ref_pa } = state;
+    named.map_or_else(
+        || format!("{{temperature: {t_ref_k} K, pressure: {p_ref_pa} Pa}}"),
+        |row| row.name.to_owned(),
+    )
+}
+
 /// Evenly spaced speeds, rounded to 100 rpm inside the range.
 fn evenly_spaced_rpm((low_rpm, high_rpm): (f64, f64)) -> Vec<f64> {
     let step_rpm = (high_rpm - low_rpm) / (GRID_LINES - 1) as f64;
@@ -344,6 +351,8 @@ pub(crate) struct FirstMap {
     pub text: String,
     /// Corrected speeds of the grid in order, rpm.
     pub speeds_rpm: Vec<f64>,
+    /// Reference state of the table, and of the campaign.
+    pub reference: ReferenceState,
     /// Choke flow of the machine's own map over that of a similar compressor at equal speed; `None` without an own map.
     pub flow_ratio: Option<f64>,
 }
@@ -371,9 +380,14 @@ impl FirstMap {
 fn resample_table(
     registry: &Registry,
     path: &Path,
-    reference: ReferenceState,
-) -> Result<String, SessionError> {
-    let map = registry.read_map(path, Some(reference))?;
+    reference: Option<ReferenceState>,
+) -> Result<(String, ReferenceState), SessionError> {
+    let map = match registry.read_map(path, reference) {
+        Err(SessionError::Import(_, ImportError::NoReference)) => {
+            registry.read_map(path, Some(ReferenceState::SAE))?
+        }
+        map => map?,
+    };
     let misfit = |misfit| FirstMapError::Misfit { path: path.to_owned(), misfit };
     let efficiencies = map.lines.iter().flat_map(|line| &line.points).filter_map(|point| point.eta);
     if let Some(poor) = efficiencies.reduce(f64::max).and_then(MapMisfit::of_peak_efficiency) {
@@ -402,7 +416,7 @@ fn resample_table(
             }
         }
     }
-    Ok(text)
+    Ok((text, map.reference))
 }
 
 fn map_from_file(
@@ -410,8 +424,7 @@ fn map_from_file(
     request: &FirstCampaignRequest,
     path: &Path,
 ) -> Result<FirstMap, SessionError> {
-    let reference = request.reference.state;
-    let text = resample_table(registry, path, reference)?;
+    let (text, reference) = resample_table(registry, path, request.reference)?;
     let map = nominal_table(&text, Some(reference))
         .map_err(|source| Box::new(FirstMapError::NotAMap(path.to_owned(), source)))?;
     if let Some(misfit) = find_map_misfit(&map, request.wheel_diameter_m) {
@@ -438,6 +451,7 @@ fn map_from_file(
         flow_ratio: Some(choke(&map) / choke(&similar)),
         text,
         speeds_rpm,
+        reference,
     })
 }
 
@@ -445,17 +459,15 @@ fn map_from_file(
 fn similar_map(request: &FirstCampaignRequest) -> FirstMap {
     let wheel_diameter_m = request.wheel_diameter_m;
     let map = ClosedFormMap { wheel_diameter_m };
-    let reference = request.reference.state;
+    let reference = request.reference.unwrap_or(ReferenceState::SAE);
     let speed_factor = TURBO_A_WHEEL_M / wheel_diameter_m;
     let default = (speed_factor * TURBO_A_SPEEDS_RPM.0, speed_factor * TURBO_A_SPEEDS_RPM.1);
     let speeds_rpm = evenly_spaced_rpm(request.speeds_rpm.unwrap_or(default));
     let mut text = format!(
         "# Nominal map of a compressor with a {} mm wheel, geometrically similar to turbo_a. Replace it with your own map if you have one.\n\
-         # Corrected to {} ({}).\n\
+         # Corrected to {reference}.\n\
          speed [rpm],flow [kg/s],pressure ratio,efficiency\n",
-        significant_digits(1e3 * wheel_diameter_m, 6),
-        request.reference.name,
-        request.reference.printed
+        significant_digits(1e3 * wheel_diameter_m, 6)
     );
     for rpm in &speeds_rpm {
         let speed_sae_rpm = rpm * reference.speed_factor_to(ReferenceState::SAE);
@@ -470,5 +482,5 @@ fn similar_map(request: &FirstCampaignRequest) -> FirstMap {
             text += &format!("{rpm:.0},{flow_kg_s:.6},{pressure_ratio:.5},{:.5}\n", point.efficiency);
         }
     }
-    FirstMap { file_name: format!("{}_map.csv", request.name), text, speeds_rpm, flow_ratio: None }
+    FirstMap { file_name: format!("{}_map.csv", request.name), text, speeds_rpm, reference, flow_ratio: None }
 }

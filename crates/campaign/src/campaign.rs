@@ -172,9 +172,7 @@ pub(crate) struct CampaignFile {
     #[schemars(example = &"PTC 10")]
     acceptance: Option<AcceptanceFile>,
     /// Declared tolerances of the nominal model; the defaults if none are given.
-    #[serde(default, deserialize_with = "TolerancesElement::declared")]
-    #[schemars(with = "TolerancesElement")]
-    tolerances: Option<ModelTolerances>,
+    tolerances: Option<TolerancesElement>,
     /// The rig, by the name of its backend, with the backend's own settings below it, e.g. `virtual_lab: {}`. The backend checks its settings.
     #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"virtual_lab": {}}))]
     backend: BTreeMap<String, serde_json::Value>,
@@ -293,7 +291,7 @@ impl CampaignFile {
             sensors,
             calibration: self.calibration,
             acceptance: self.acceptance.map(AcceptanceCriteria::from),
-            tolerances: self.tolerances.unwrap_or_default(),
+            tolerances: self.tolerances.map(TolerancesElement::tolerances).unwrap_or_default(),
             tolerances_declared: self.tolerances.is_some(),
             backend: backend(self.backend),
             readers: readers(self.readers),

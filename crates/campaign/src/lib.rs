@@ -17,6 +17,7 @@ mod nightly;
 mod resolved;
 mod si_values;
 #[cfg(test)]
+#[path = "../tests/inside/testing.rs"]
 mod testing;
 
 pub use crate::elements::turbocharger::machine::{NominalTableError, nominal_table};

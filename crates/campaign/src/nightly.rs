@@ -45,14 +45,12 @@ pub struct NightlyGroup {
     pub methods: Vec<String>,
     /// Seeds; empty: the campaign's own.
     pub seeds: Vec<u64>,
-    /// Table of machines, resolved from the nightly file's directory; `None`: the campaign's own.
-    pub machines: Option<PathBuf>,
-    /// Number of machines drawn from the campaign's tolerances.
+    /// Number of machines drawn from the campaign's tolerances; `None`: the campaign's own.
     pub drawn_machines: Option<usize>,
 }
 
 impl NightlyGroup {
-    /// Number of runs; a table of machines counts as one machine, because it has not been read yet.
+    /// Number of runs.
     pub fn runs(&self) -> usize {
         let machines = self.drawn_machines.unwrap_or(1);
         self.methods.len().max(1).saturating_mul(self.seeds.len().max(1)).saturating_mul(machines)
@@ -98,9 +96,6 @@ struct GroupFile {
     /// Seeds, whole numbers from 0; the campaign's own if none is given.
     #[schemars(extend("uniqueItems" = true, "examples" = [[1, 2, 3]]))]
     seeds: Option<Vec<u64>>,
-    /// Table of machines that are run one by one (CSV, relative to this file): `serial_number`, and settings of the simulated rig by their path.
-    #[schemars(length(min = 1), example = &"nightly/production.csv")]
-    machines: Option<PathBuf>,
     /// Number of machines that are drawn from the campaign's tolerances and run one by one, from 1.
     #[schemars(range(min = 1), example = 200)]
     drawn_machines: Option<usize>,
@@ -160,14 +155,6 @@ fn resolve(file: NightlyFile, folder: &Path) -> Result<Nightly, Vec<Mistake>> {
                 remedy: "name it once with all its methods and seeds",
             });
         }
-        if group.machines.is_some() && group.drawn_machines.is_some() {
-            mistakes.push(Mistake {
-                steps: steps!["runs", index, "drawn_machines"].to_vec(),
-                kind: FindingKind::Range,
-                message: "`machines` and `drawn_machines` exclude each other".to_owned(),
-                remedy: "remove one of the two",
-            });
-        }
     }
     let groups: Vec<NightlyGroup> = file
         .runs
@@ -176,7 +163,6 @@ fn resolve(file: NightlyFile, folder: &Path) -> Result<Nightly, Vec<Mistake>> {
             campaign: folder.join(group.campaign),
             methods: group.methods.unwrap_or_default(),
             seeds: group.seeds.unwrap_or_default(),
-            machines: group.machines.map(|table| folder.join(table)),
             drawn_machines: group.drawn_machines,
         })
         .collect();

@@ -3,18 +3,10 @@
 use crate::units::{Dimension, Quantity};
 use serde::{Deserialize, Deserializer};
 
-/// For `deserialize_with`: a required key, or one whose default is in the struct.
-///
-/// # Errors
-/// The deserialiser's error, if the text is not a value of the dimension.
-pub(crate) fn si<'de, D: Dimension, S: Deserializer<'de>>(deserializer: S) -> Result<f64, S::Error> {
-    Quantity::<D>::deserialize(deserializer).map(|quantity| quantity.value)
-}
-
 /// For `deserialize_with`, together with `default`: an optional key.
 ///
 /// # Errors
-/// As [`si`].
+/// The deserialiser's error, if the text is not a value of the dimension.
 pub(crate) fn optional_si<'de, D: Dimension, S: Deserializer<'de>>(
     deserializer: S,
 ) -> Result<Option<f64>, S::Error> {

@@ -43,9 +43,23 @@ pub fn key_and_value(text: &str) -> Result<(String, String), String> {
     Ok((key.trim().to_owned(), value.to_owned()))
 }
 
-/// The campaign of an option, if given.
-pub fn given_campaign(path: Option<&Path>) -> Result<Option<Campaign>, Failure> {
-    path.map(|path| mapper_campaign::load(path).map_err(Failure::of_campaign)).transpose()
+/// Options to read recordings.
+#[derive(Debug, Args)]
+pub struct RecordingReading {
+    /// Channel map: where a recording made by another program holds the rig's channels (YAML)
+    #[arg(long, value_name = "FILE")]
+    channels: Option<PathBuf>,
+    /// Campaign with machine, sensors and window, instead of the one attached to the recording
+    #[arg(long, value_name = "FILE")]
+    campaign: Option<PathBuf>,
+}
+
+impl RecordingReading {
+    /// The channel map, and the campaign if given.
+    pub fn read(&self) -> Result<(ChannelMap, Option<Campaign>), Failure> {
+        let campaign = self.campaign.as_deref().map(mapper_campaign::load).transpose();
+        Ok((channel_map(self.channels.as_deref())?, campaign.map_err(Failure::of_campaign)?))
+    }
 }
 
 /// The channel map of an option; by default the one for recordings of this program.

@@ -34,9 +34,9 @@ pub use identification::thermal_model::{
     ThermalModel,
 };
 pub use identification::warning::{
-    Bound, CalibrationDefect, EndEvidence, EtaSignal, FitFailure, HeatCorrected, LeftOut, MapRegion,
-    ModelDoubt, ModelEvidence, NoCompression, PoorFit, Scaled, SeenAtRest, StepConflict, SuspectedFault,
-    Swapped, TooFew, Warning, WideInterval,
+    Bound, CalibrationDefect, EndEvidence, EtaSignal, FitFailure, LeftOut, MapRegion, ModelDoubt,
+    ModelEvidence, NoCompression, PoorFit, Scaled, SeenAtRest, StepConflict, SuspectedFault, Swapped, TooFew,
+    Warning, WideInterval,
 };
 pub use json_messages::{JsonMessages, Sentences, with_sentences};
 pub use maps::imported_map::{

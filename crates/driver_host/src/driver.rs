@@ -1,6 +1,6 @@
 //! A driver program as a backend.
 
-use crate::error::DriverError;
+use crate::find::DriverError;
 use crate::find::{Endpoint, PREFIX, SearchPath, file_name};
 use crate::link::{Lease, Link};
 use crate::protocol::{
@@ -378,16 +378,9 @@ impl Backend for Driver {
     fn describe(&self) -> RigDescription {
         self.description.clone().unwrap_or_else(|| RigDescription {
             backend: self.name.clone(),
-            version: String::new(),
-            channels: Vec::new(),
             sample_rate_hz: 1.0,
             simulated_time: true,
-            controls: false,
-            exclusive: None,
-            reached_at: None,
-            needs_guarded: Vec::new(),
-            accepts: None,
-            safe: mapper_core::SafeTrajectory::default(),
+            ..RigDescription::default()
         })
     }
 

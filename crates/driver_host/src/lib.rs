@@ -9,7 +9,6 @@
 
 pub mod conformance;
 mod driver;
-mod error;
 mod find;
 mod link;
 pub mod protocol;
@@ -17,5 +16,4 @@ mod sample_queue;
 mod secrets;
 
 pub use driver::{DEFAULT_TIMEOUTS, Driver, Timeouts};
-pub use error::DriverError;
-pub use find::{DriverLocation, Endpoint, INCLUDED_DRIVERS, PREFIX, SearchPath};
+pub use find::{DriverError, DriverLocation, Endpoint, INCLUDED_DRIVERS, PREFIX, SearchPath};

@@ -1,7 +1,7 @@
 //! The pipes or the socket to a driver. Separate threads read and write, so that no call exceeds its timeout; a third keeps the lease: the host
 //! sends an armed driver a message twice a second, otherwise the driver executes its safe trajectory.
 
-use crate::error::DriverError;
+use crate::find::DriverError;
 use crate::protocol::{
     Encoding, FRAME_LIMIT_BYTES, FrameError, Message, RENEW_S, decode, encode, read_frame, write_frame,
 };

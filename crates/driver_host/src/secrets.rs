@@ -1,6 +1,6 @@
 //! Secrets are read from the environment only.
 
-use crate::error::DriverError;
+use crate::find::DriverError;
 use serde_json::Value;
 
 /// A setting is secret if its key contains one of these, without regard to capitals and separators.

@@ -10,7 +10,6 @@
 
 mod files;
 mod fleet;
-mod merge;
 mod part;
 mod status;
 mod study;
@@ -21,9 +20,8 @@ pub use files::{FleetError, Hash, Machine, StudyFileError};
 pub use fleet::{
     CreatedStudy, Fleet, ItemDraft, Kind, Output, Results, StudyDraft, WorkContext, WorkError, kind_of,
 };
-pub use merge::MergeOutcome;
 pub(crate) use part::{Outcome, Part};
-pub use status::{Shard, Status, UnfinishedItem};
+pub use status::{MergeOutcome, Shard, Status, UnfinishedItem};
 pub use study::{Item, ItemEntry, Study, StudyFile, open_study};
 pub use submit::{Limits, Submission, SubmitOptions, Template, number_ranges, query_task_states};
 pub use work::{Cost, CostEstimate, Engine, ItemSelection, WorkOutcome, cores};

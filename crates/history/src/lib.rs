@@ -5,12 +5,10 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod compare;
-mod metric;
 mod night;
 mod store;
 
 pub use compare::{Comparison, MetricOutsideBand, PointsOutsideBand, Shift, compare};
 pub use mapper_numerics::statistics::median;
-pub use metric::{Band, Floor, Metric};
-pub use night::{Night, PointQuantity, PointRow, RunKey, RunRow};
+pub use night::{Band, Floor, Metric, Night, PointQuantity, PointRow, RunKey, RunRow};
 pub use store::{Filter, History, HistoryError, ListedRun, StoredNight};

@@ -10,7 +10,7 @@ use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
 use mapper_physics::gas::pressure_tap::static_to_total_pa;
 use mapper_physics::machine::params::{BearingParams, Params};
-use mapper_physics::rig::sensor_fault::Rest;
+use mapper_physics::rig::sensor_fault::ExactReadings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -79,7 +79,7 @@ pub struct IdentifyConfig {
     /// One standard deviation of the humidity of `air`, kg/kg: part of the intervals of the joint method.
     pub humidity_sigma_kg_kg: f64,
     /// Readings of an isothermal zero: gain errors count from there.
-    pub rest: Rest,
+    pub rest: ExactReadings,
     /// Declared play of the back-pressure valve, opening.
     pub valve_play_ratio: f64,
     /// Error that all absolute pressures share, one standard deviation, Pa: of the barometer to which gauge pressures are added, and what an
@@ -130,7 +130,7 @@ impl Default for IdentifyConfig {
             air: Air::PAPER,
             turbine_gas: Gas::CLOSED_FORM_AIR,
             humidity_sigma_kg_kg: 0.0,
-            rest: Rest::default(),
+            rest: ExactReadings::default(),
             valve_play_ratio: 0.0,
             barometer_sigma_pa: 0.0,
             barometer_pa: None,

@@ -11,7 +11,7 @@ use mapper_core::{Channel, FaultKind, Method, ModelTolerances, Recording, Verdic
 use mapper_identify::{
     Identified, IdentifyConfig, Machine, NominalRig, Suspect, blade_count, identify_recording,
 };
-use mapper_physics::rig::sensor_fault::{Rest, additive};
+use mapper_physics::rig::sensor_fault::{ExactReadings, additive};
 use mapper_physics::simulation::model::Model;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -71,7 +71,8 @@ fn with(recording: &Recording, suspect: &Suspect, size: f64) -> Recording {
         for (t_s, value) in series.t_s.iter().zip(&mut series.values) {
             let share = (t_s - start_s) / (end_s - start_s);
             let housing_k = housing.interpolate(*t_s).unwrap();
-            *value += size * fault.error_per_unit(*channel, *value, housing_k, share, Rest::default());
+            *value +=
+                size * fault.error_per_unit(*channel, *value, housing_k, share, ExactReadings::default());
         }
     }
     doctored

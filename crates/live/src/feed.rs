@@ -114,10 +114,6 @@ pub struct LiveRun<'a> {
     pub plan: &'a Plan,
     /// Ratio of rig time to wall-clock time; `None`: as fast as possible.
     pub pace: Option<f64>,
-    /// Measured channels and setpoints of the rig.
-    pub channels: &'a [Channel],
-    /// Epoch time of run time 0, ns, as in the recording.
-    pub start_time_ns: u64,
     /// Operator requests read by the runner.
     pub operator: Arc<Operator>,
     /// Stops at the end of the step.

@@ -148,7 +148,4 @@ pub enum LiveError {
     Page(#[from] serde_json::Error),
     #[error(transparent)]
     Tls(#[from] TlsError),
-    #[cfg(feature = "foxglove")]
-    #[error(transparent)]
-    Foxglove(#[from] crate::foxglove_stream::FoxgloveStreamError),
 }

@@ -126,7 +126,6 @@ mod campaign;
 mod diagnosis;
 mod error;
 mod identification;
-mod map_files;
 mod plugins;
 mod recording;
 mod run;
@@ -135,7 +134,6 @@ pub use campaign::Campaign;
 pub use diagnosis::{Correction, Diagnosis, DiagnosisOptions};
 pub use error::{Error, show_in_campaign};
 pub use identification::{Identification, identify};
-pub use map_files::{read_map, write_map};
 pub use mapper_core::{
     Backend, Channel, Clock, CompressorMap, Event, EventKind, IdentifiedPoint, Jump, MapFormat, Method,
     OperatingPoint, PacedClock, Plan, PlanStep, ReferenceState, RigDescription, RunEnding, SampleBatch,
@@ -149,7 +147,7 @@ pub use mapper_report::with_messages;
 pub use mapper_session::{
     ErrorKind, Existing, Gap, Identified, Input, Recorded, Registry, Rehearsal, Results, SessionEvent,
 };
-pub use plugins::{driver_locations, plugins};
+pub use plugins::{driver_locations, plugins, read_map, write_map};
 pub use recording::Recording;
 pub use run::{BeforeArming, Observer, Run, RunOptions};
 

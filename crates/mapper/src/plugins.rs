@@ -1,13 +1,14 @@
-//! The one place that names plug-ins.
+//! The one place that names plug-ins, and files with maps in their formats.
 
+use crate::error::Error;
 use mapper_backends::BACKENDS;
-use mapper_core::{Backend, BackendError};
+use mapper_core::{Backend, BackendError, CompressorMap, ReferenceState};
 use mapper_driver_host::{Driver, INCLUDED_DRIVERS, SearchPath};
 use mapper_effects::ScriptEffect;
 use mapper_formats::FORMATS;
 use mapper_log_formats::LOG_FORMATS;
 use mapper_physics::rig::effect::Effect;
-use mapper_session::{Registry, SessionError};
+use mapper_session::{Existing, Registry, SessionError, write_map_fitted_if_needed};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -66,4 +67,29 @@ fn start_driver(name: &str, settings: &Value) -> Result<Box<dyn Backend>, Backen
     let hint =
         known.map_or_else(String::new, |(.., line)| format!("; `{line}` in the source of mapper builds it"));
     Ok(Box::new(Driver::find(&driver_locations(), name, settings, &built_in, &hint)?))
+}
+
+/// Reads a map file of any format, or the map of a run's directory. The extension selects the format. `reference`: state that the file's
+/// corrected values refer to, if the file does not say so.
+///
+/// # Errors
+/// If the file cannot be read, no format has its extension, or it has mistakes.
+pub fn read_map(path: impl AsRef<Path>, reference: Option<ReferenceState>) -> Result<CompressorMap, Error> {
+    Ok(plugins().read_map(path.as_ref(), reference)?)
+}
+
+/// Writes a map to a file, in the format of this name, or that of the file's extension. A format that tabulates the whole map gets a fitted
+/// one.
+///
+/// # Errors
+/// If there is no such format, it cannot represent the map, or the file cannot be written.
+pub fn write_map(
+    map: &CompressorMap,
+    path: impl AsRef<Path>,
+    format: Option<&str>,
+    existing: Existing,
+) -> Result<(), Error> {
+    let format = plugins().format_of(path.as_ref(), format)?;
+    write_map_fitted_if_needed(path.as_ref(), format, map.clone(), existing)?;
+    Ok(())
 }

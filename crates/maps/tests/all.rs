@@ -3,7 +3,6 @@
 
 mod assemble;
 mod efficiency;
-mod heat_correction;
 mod line_ends;
 mod map_fit;
 mod support;

@@ -4,7 +4,7 @@ use mapper_core::{
     Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour, RigActuators, StructureTolerances,
 };
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::rig::sensor_fault::Rest;
+use mapper_physics::rig::sensor_fault::ExactReadings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -80,11 +80,11 @@ pub struct CommonOffset {
 }
 
 /// Readings of the isothermal zero, from which gain errors count.
-pub fn rest(common: &[CommonOffset]) -> Rest {
+pub fn rest(common: &[CommonOffset]) -> ExactReadings {
     let of = |channel| common.iter().find(|common| common.channels.contains(&channel));
     let (pressure, temperature) = (of(Channel::P1), of(Channel::T2));
-    let without = Rest::default();
-    Rest {
+    let without = ExactReadings::default();
+    ExactReadings {
         pressure_pa: pressure.map_or(without.pressure_pa, |common| common.reading),
         temperature_k: temperature.map_or(without.temperature_k, |common| common.reading),
     }
@@ -104,7 +104,7 @@ impl Declared {
     }
 
     /// Readings from which gain errors count.
-    pub fn rest(&self) -> Rest {
+    pub fn rest(&self) -> ExactReadings {
         rest(&self.common_offsets)
     }
 

@@ -1,7 +1,7 @@
 //! Prepares a recording for comparison with the model: time base, noise, model inputs, and declared uncertainty.
 //!
 //! Shared by the diagnosis of gaps, which drives the nominal model by a recording and explains the residual, by the search for drift, and
-//! by the identification. A [`Table`](averages::time_table::Table) has all channels at the same times.
+//! by the identification. A [`Table`](averages::Table) has all channels at the same times.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,7 +1,7 @@
 //! The motion of a stand's actuators in a recording of small steps, with intervals, next to what the campaign declares: lag, rate and dead time from each
 //! jump, play and dead band of a valve from the positions in which it settles.
 
-use crate::averages::time_table::Table;
+use crate::averages::Table;
 use crate::model_inputs::lagged_command::{Path, Response, Search, estimate_response, valve_areas_m2};
 use mapper_core::unit_factors::{PA_PER_KPA, PERCENT};
 use mapper_core::{Channel, Recording, RigActuators, StepMarker, is_same_command};

@@ -3,7 +3,7 @@
 
 use mapper_core::{Channel, DeclaredUncertainty, NoiseColour, Recording, Series, StepKind, StepMarker};
 use mapper_observe::Declared;
-use mapper_observe::averages::time_table::Table;
+use mapper_observe::averages::Table;
 use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_physics::machine::params::BoundaryConditions;

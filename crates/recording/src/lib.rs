@@ -33,5 +33,5 @@ pub use mcap::chunk::ChunkError;
 pub use reading::recording_reader::{ReadReport, read_marks, read_recording, read_recording_from};
 pub use reading::scan::ReadOptions;
 pub use writing::recording_file::RecordingHeader;
-pub use writing::topics::{StepPhase, Topic, event_message, readings_message, step_message};
+pub use writing::topics::StepPhase;
 pub use writing::writer::RecordingWriter;

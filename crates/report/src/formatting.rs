@@ -384,8 +384,6 @@ mod tests {
         {"code": "prior_dominated", "eta_error": 0.02},
         {"code": "assumed_alpha", "alpha_area_ratio": 0, "alpha_area_sigma_ratio": 0.1, "eta_sigma": 0.02},
         {"code": "nothing_declared"},
-        {"code": "heat_corrected", "kind": "corrected", "apparent_eta": 0.6},
-        {"code": "heat_corrected", "kind": "too_much_heat", "heat_w": 90},
         {"code": "left_out", "kind": "poor_fit"},
         {"code": "left_out", "kind": "readings"},
         {"code": "left_out", "kind": "region", "region": "choke", "sigmas": 7, "doubts": [{"kind": "scatter", "scatter_ratio": 0.1}]},

@@ -22,7 +22,7 @@ mod test_report;
 mod thermal_model;
 
 pub use diagnosis::drift::corrected_csv;
-pub use diagnosis::gap_results::{compared_recordings, correction, forecast_check};
+pub use diagnosis::gap_results::{correction, forecast_check};
 pub use diagnosis::gap_text::headline;
 pub use document::{Cell, Describe, Document, Paint, Table, markdown_table, markdown_text, wrapped};
 pub use formatting::{
@@ -36,8 +36,8 @@ pub use page::widgets::OtherRun;
 pub use pictures::{distinct_names, error_figure, heat_transfer_figure, history_svg, map_comparison_figure};
 pub use plan::campaign_check::CheckedCampaign;
 pub use plan::commissioning::{commissioning_document, commissioning_json, values_to_declare};
+pub use plan::plan_document::plan_svg;
 pub use plan::plan_document::{comparison_json, jump_forecast, jump_json, plan_comparison, plan_document};
-pub use plan::plan_picture::plan_svg;
 pub use plan::plan_remark_text::guard_trip_text;
 pub use point_results::budget_table::budget_csv;
 pub use point_results::summary::PointResults;

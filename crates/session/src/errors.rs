@@ -1,6 +1,5 @@
 //! Errors of a session, their category and the input that they are about.
 
-use crate::variant::VariantError;
 use mapper_campaign::{
     CampaignError, Findings, MapMisfit, NightlyError, NominalTableError, USUAL_WHEEL_DIAMETERS_M,
 };
@@ -11,7 +10,7 @@ use mapper_fmu::FmuError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
 use mapper_maps::table::DescriptionError;
-use mapper_maps::{AssembleError, HeatCorrectionError, MapFitError, TurbineFitError};
+use mapper_maps::{AssembleError, MapFitError, TurbineFitError};
 use mapper_observe::OtherMachine;
 use mapper_physics::compressor_map::tabulated_map::MapError;
 use mapper_physics::simulation::steady::SteadyError;
@@ -64,8 +63,6 @@ pub enum SessionError {
     Nightly(#[from] NightlyError),
     #[error("{}: the points of a script may differ between nights; replace `sequence` by a grid", .0.display())]
     NightlySequence(PathBuf),
-    #[error(transparent)]
-    Variant(#[from] VariantError),
     /// Two runs of a night have the same campaign, machine, method and seed.
     #[error("{0} appears twice in the nightly campaign; give each campaign its own name")]
     DuplicateNightlyRun(String),
@@ -319,7 +316,6 @@ impl SessionError {
             | E::Nightly(NightlyError::Mistakes(_))
             | E::NightlySequence(..)
             | E::DuplicateNightlyRun(..)
-            | E::Variant(_)
             | E::NightlyMismatch(..)
             | E::NoRecording
             | E::DifferentCampaigns { .. }
@@ -465,8 +461,6 @@ pub enum MapWorkError {
     NotMeasured(PathBuf),
     #[error("{}: {}", .0.display(), .1)]
     NotAssembled(PathBuf, #[source] AssembleError),
-    #[error("{}: {}", .0.display(), .1)]
-    NotCorrected(PathBuf, #[source] HeatCorrectionError),
     #[error(
         "the file does not state how its efficiencies are defined; state the definition, e.g. `constant_gamma 1.4`"
     )]

@@ -19,7 +19,6 @@ mod registry;
 mod rig;
 mod run;
 mod session;
-mod variant;
 
 pub use crate::analysis::calibrated_model::{
     CalibratedModel, SealedForecast, calibrated_model_campaign, found_in,
@@ -28,7 +27,7 @@ pub use crate::errors::{
     ErrorKind, FirstMapError, FmuExportError, Input, MapWorkError, SessionError, since_text,
 };
 pub use crate::machine::first_campaign::{FirstCampaignRequest, FirstRig};
-pub use crate::nightly::NightlyRun;
+pub use crate::nightly::{DrawnMachine, NightlyRun};
 pub use crate::recording::files::{PROGRAM, program_and_commit};
 pub use analysis::drift::Drift;
 pub use analysis::gap::Gap;
@@ -55,10 +54,9 @@ pub use rig::rig_state::{RigStates, RigStatus, shared_state_directory};
 pub use rig::sources::Sources;
 pub use run::commissioning::Commissioning;
 pub use run::preflight::load_on;
-pub use run::prepared_run::{PreparedRun, RecordedRun, RunOutcome, RunRequest, start_time_ns};
+pub use run::prepared_run::{PreparedRun, RecordedRun, RunOutcome, RunRequest};
 pub use run::run_stop::{Phase, RunStop, SignalResponse};
 pub use session::{Session, SessionEvent};
-pub use variant::Variant;
 
 #[cfg(test)]
 #[path = "../tests/common/shipped.rs"]

@@ -7,7 +7,6 @@ use crate::recording::recording_file::Recorded;
 use crate::recording::run_directory;
 use crate::rig::drive::drive;
 use crate::rig::observers::Recorder;
-use crate::variant::{Variant, VariantError};
 use crate::{ErrorKind, Existing, Session, SessionError, SessionEvent, write_file};
 use mapper_campaign::{Campaign, Nightly};
 use mapper_core::{Method, Plan, RunEnding, Verdict};
@@ -19,10 +18,47 @@ use mapper_recording::score::ScoredPoint;
 use mapper_recording::{ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, read_recording};
 use mapper_report::{Document, listed_runs, night_comparison};
 use mapper_runner::PlanSteps;
-use serde_json::Value;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+
+/// First seed of drawn machines, far above those of campaigns. A machine keeps its own seed for any number of drawn machines.
+const FIRST_DRAWN_SEED: u64 = 1_000_000;
+
+/// One drawn machine.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DrawnMachine {
+    /// Its serial number, the key of its results.
+    pub serial_number: String,
+    /// Seed of its deviations.
+    pub tolerances_seed: u64,
+}
+
+impl DrawnMachine {
+    /// Machines drawn from the campaign's declared tolerances. Repeated calls return the same machines.
+    pub fn draw(campaign: &Campaign, count: usize) -> Vec<DrawnMachine> {
+        let kind = campaign.machine.serial_number.as_deref().unwrap_or(&campaign.machine.name);
+        let machine = |index| DrawnMachine {
+            serial_number: format!("{kind}-drawn-{:04}", index + 1),
+            tolerances_seed: FIRST_DRAWN_SEED + index as u64,
+        };
+        (0..count).map(machine).collect()
+    }
+
+    /// Puts the machine into a campaign. The backend itself checks that it can draw machines.
+    pub fn apply_to(&self, campaign: &mut Campaign) {
+        campaign.machine.serial_number = Some(self.serial_number.clone());
+        let settings = &mut campaign.backend.settings;
+        if !settings.is_object() {
+            *settings = json!({});
+        }
+        settings["tolerances"] = json!("drawn");
+        settings["tolerances_seed"] = json!(self.tolerances_seed);
+    }
+}
 
 /// All runs of a night, ready to start.
 pub struct PreparedNight {
@@ -48,17 +84,14 @@ impl PreparedNight {
             } else {
                 group.methods.iter().map(|name| method(name)).collect::<Result<_, _>>()?
             };
-            let machines: Vec<Option<Variant>> = match (&group.machines, group.drawn_machines) {
-                (Some(table), _) => Variant::read(table)?.into_iter().map(Some).collect(),
-                (None, Some(count)) => Variant::draw(&campaign, count).into_iter().map(Some).collect(),
-                (None, None) => vec![None],
-            };
+            let drawn = |count| DrawnMachine::draw(&campaign, count).into_iter().map(Some).collect();
+            let machines: Vec<Option<DrawnMachine>> = group.drawn_machines.map_or_else(|| vec![None], drawn);
             let seeds = if group.seeds.is_empty() { vec![campaign.seed] } else { group.seeds.clone() };
             for method in methods {
                 for &seed in &seeds {
                     for machine in &machines {
                         let run =
-                            NightlyRun::new(campaign.clone(), model.clone(), method, seed, machine.clone())?;
+                            NightlyRun::new(campaign.clone(), model.clone(), method, seed, machine.clone());
                         if !keys.insert(run.key.clone()) {
                             return Err(SessionError::DuplicateNightlyRun(run.key.to_string()));
                         }
@@ -104,7 +137,7 @@ impl Session<'_> {
     /// a row with its reason.
     pub fn run_night(&self, night: &PreparedNight, jobs: Option<usize>) -> Result<Vec<RunRow>, SessionError> {
         let runs = &night.runs;
-        // Machines that the backend does not know are reported before any run.
+        // A backend that cannot draw machines is reported before any run.
         for run in runs.iter().filter(|run| run.machine.is_some()) {
             self.registry.make_sources(&run.campaign, &run.model)?;
         }
@@ -140,27 +173,24 @@ pub struct NightlyRun {
     /// Its nominal model.
     pub model: Model,
     /// The machine, if it is one of several.
-    pub machine: Option<Variant>,
+    pub machine: Option<DrawnMachine>,
     /// Key of the run, the same every night.
     pub key: RunKey,
 }
 
 impl NightlyRun {
     /// A campaign with a method, a seed and, optionally, one of several machines.
-    ///
-    /// # Errors
-    /// `VariantError` if the machine cannot be put into the campaign.
     pub fn new(
         mut campaign: Campaign,
         model: Model,
         method: Method,
         seed: u64,
-        machine: Option<Variant>,
-    ) -> Result<NightlyRun, VariantError> {
+        machine: Option<DrawnMachine>,
+    ) -> NightlyRun {
         campaign.identification.method = method;
         campaign.seed = seed;
         if let Some(machine) = &machine {
-            machine.apply_to(&mut campaign)?;
+            machine.apply_to(&mut campaign);
         }
         let key = RunKey {
             campaign: campaign.name.clone(),
@@ -170,7 +200,7 @@ impl NightlyRun {
             method: method.to_string(),
             seed,
         };
-        Ok(NightlyRun { campaign, model, machine, key })
+        NightlyRun { campaign, model, machine, key }
     }
 
     /// Plans, runs, records, identifies and scores. A failure becomes part of the row.

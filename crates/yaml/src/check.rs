@@ -2,8 +2,8 @@
 //!
 //! serde would stop at the first mistake, and would lose position and choices for untagged enums and unknown keys.
 
+use crate::document::positions::Tree;
 use crate::document::positions::{Step, path_text};
-use crate::document::tree::Tree;
 use crate::rules::{Message, Rule, Violation, check_quantity, find_violations, name_of};
 use crate::source::{Finding, FindingKind, Notes, closest, guess};
 use schemars::JsonSchema;

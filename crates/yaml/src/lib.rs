@@ -17,6 +17,5 @@ pub mod units;
 
 pub use check::{Schema, json_schema_of};
 pub use document::file::{open, open_file, read_limited};
-pub use document::positions::{Step, path_text};
-pub use document::tree::{Tree, read};
+pub use document::positions::{Step, Tree, path_text, read};
 pub use source::{Document, Finding, FindingKind, Findings, Notes, Source, closest};

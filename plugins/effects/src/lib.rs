@@ -7,6 +7,7 @@
 
 mod script;
 #[cfg(test)]
+#[path = "../tests/inside/testing.rs"]
 mod testing;
 
 pub use script::{HOOK_NAMES, ScriptEffect, ScriptEffectError};

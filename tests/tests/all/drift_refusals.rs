@@ -147,7 +147,7 @@ fn recordings_without_comparable_repeats_get_a_reason_and_no_verdict() {
 
 fn ask(recording: &Path, campaign: &Path) -> Finished {
     let arguments: [PathBuf; 4] =
-        ["drift".into(), "--recording".into(), recording.to_owned(), campaign.to_owned()];
+        ["drift".into(), recording.to_owned(), "--campaign".into(), campaign.to_owned()];
     mapper(arguments.iter().map(PathBuf::as_path).chain([Path::new("--json")]))
 }
 

@@ -141,15 +141,13 @@ fn a_sharded_calibration_equals_a_single_one_and_scores_its_probabilities() {
     }
     assert!(of_fleet("reliability.svg").starts_with(b"<svg"));
 
-    // One machine, one process.
-    let (own, cases) = (folder.join("own.json"), folder.join("cases.json"));
-    let arguments =
-        ["gap", "blind", "calibrate", "--seed", "5", "--nulls", "2", "--cases", "1", "--campaign"];
-    let files =
-        [file.to_str().unwrap(), "--out", own.to_str().unwrap(), "--observed", cases.to_str().unwrap()];
-    mapper(arguments.iter().chain(&files)).exits(0);
-    assert!(of_fleet("observed.json") == std::fs::read(&cases).unwrap(), "the same diagnoses to the byte");
-    assert!(of_fleet("calibration.json") == std::fs::read(&own).unwrap(), "the same calibration to the byte");
+    // Without shards.
+    let whole = folder.join("whole");
+    make(&study, &whole);
+    mapper(fleet("run", &whole, &[])).exits(0);
+    for name in ["observed.json", "calibration.json"] {
+        assert!(of_fleet(name) == std::fs::read(whole.join("result").join(name)).unwrap(), "{name} differs");
+    }
 }
 
 #[test]

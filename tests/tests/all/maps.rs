@@ -163,35 +163,6 @@ fn a_run_gives_the_turbine_that_the_rig_has_and_its_pictures() {
     run(arguments()).exits(1);
 }
 
-/// A hot map as a user has it: corrected as one with words about it, into a file that says so, and refused where it holds no heat.
-#[test]
-fn a_hot_map_is_corrected_in_the_report_and_in_a_file() {
-    let scratch = scratch();
-    let out = scratch.path().join("corrected.json");
-    let correct = |map: &Path, further: &[&str]| {
-        let further = further.iter().map(OsStr::new);
-        mapper(["map".as_ref(), "correct".as_ref(), map.as_os_str()].into_iter().chain(further))
-    };
-    let given = ["--reference", "SAE", "--out", out.to_str().unwrap()];
-    let finished = correct(&sample(), &given).exits(0);
-    assert!(finished.stdout.contains("from 81 points outside choke"), "{}", finished.stdout);
-    assert!(finished.stdout.contains("do not become one curve"), "{}", finished.stdout);
-    assert!(finished.stdout.lines().all(|line| line.len() <= 110), "{}", finished.stdout);
-    let map: Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
-    for point in lines(&map).iter().flat_map(points) {
-        assert_eq!(point["identified"]["verdict"], "doubtful");
-        assert_eq!(point["identified"]["warnings"][0]["code"], "heat_corrected");
-        let number = |key: &str| point["identified"][key].as_f64().unwrap();
-        assert!(number("eta_low") < number("eta") && number("eta") < number("eta_high"));
-    }
-    let by_hand = correct(&sample(), &["--reference", "SAE", "--heat", "100", "--json"]).exits(0).json();
-    assert_eq!(by_hand["correction"]["heat_w"], 100.0);
-    correct(&sample(), &["--reference", "SAE", "--heat=-1"]).exits(3);
-    let joint = shared_run(&CampaignFile::shipped_with(SHORT_GRID)).run.join("map.json");
-    let refused = correct(&joint, &[]).exits(3);
-    assert!(refused.stderr.contains("already exclude heat"), "{}", refused.stderr);
-}
-
 /// The same table with units in a row of their own and decimal commas.
 #[test]
 fn a_table_with_a_row_of_units_and_decimal_commas_is_the_same_map() {

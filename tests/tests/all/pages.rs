@@ -336,55 +336,6 @@ fn the_live_page_is_served_over_tls_to_another_address() {
     assert_eq!(seen["exit"], 130);
 }
 
-#[test]
-#[cfg_attr(not(with_python), ignore = "needs Python: run `cargo xtask test`")]
-fn an_observer_receives_the_recorded_values_and_never_delays_the_run() {
-    // The stream is behind a feature that `cargo xtask test` builds with.
-    if !mapper(["run", "--help"]).exits(0).stdout.contains("--foxglove") {
-        return;
-    }
-    let campaign = CampaignFile::shipped_with(NINE_POINTS);
-    let runs = campaign.runs();
-    let run = mapper_command([
-        "run".as_ref(),
-        campaign.path.as_os_str(),
-        "--out".as_ref(),
-        runs.as_os_str(),
-        "--pace".as_ref(),
-        "200".as_ref(),
-    ]);
-    let seen = python("view_stream.py", std::iter::once(run.get_program()).chain(run.get_args()));
-    assert_eq!(seen["exit"], 0);
-    assert_eq!(seen["protocol"], "foxglove.sdk.v1");
-    assert_eq!(seen["another_protocol"], 400);
-    assert_eq!(seen["server"], serde_json::json!({"op": "serverInfo", "name": "mapper", "capabilities": []}));
-    let topics = seen["topics"].as_object().unwrap();
-    for topic in ["/rig/compressor", "/rig/turbine", "/rig/ambient", "/rig/command", "/step"] {
-        let seen = &topics[topic];
-        assert_eq!(seen["encoding"], serde_json::json!(["json", "jsonschema"]), "{topic}");
-        assert_eq!(
-            [&seen["as_recorded"], &seen["values_as_recorded"], &seen["described"]],
-            [true; 3],
-            "{topic}: {seen}"
-        );
-        assert!(seen["messages"].as_u64().unwrap() > 5, "{topic}: {seen}");
-    }
-    let point = &topics["/point"];
-    assert_eq!(point["units"]["h_w_m2k"], "W/(m2 K)");
-    assert!(point["messages"].as_u64().unwrap() >= 9, "{point}");
-    assert_eq!(topics["/rig/compressor"]["units"]["outlet_temperature_k"], "K");
-    // What the layout shows is there, live and in the recording.
-    assert_eq!(seen["layout"]["unknown"], serde_json::json!([]));
-    assert_eq!(seen["layout"]["panels"], true);
-    assert!(seen["layout"]["paths"].as_u64().unwrap() > 15);
-    for (topic, recorded) in seen["recorded"].as_object().unwrap() {
-        assert_eq!(recorded["encoding"], serde_json::json!(["json", "jsonschema"]), "{topic}");
-        for (field, unit) in recorded["units"].as_object().unwrap() {
-            assert!(unit.is_string(), "{topic}.{field} has no unit");
-        }
-    }
-}
-
 /// The scripts in the pages are those that their makers publish, byte for byte.
 #[test]
 #[cfg_attr(not(with_npm), ignore = "needs npm and its registry: run `cargo xtask test`")]

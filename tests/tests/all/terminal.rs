@@ -109,7 +109,7 @@ fn failures_of_every_kind_have_the_same_form() {
         (6, &["identify", &empty]),
         (1, &["report", "nosuch", "-o", "never.html"]),
         (6, &["gap", "diagnose", SHIPPED, "--recording", &junk]),
-        (1, &["gap", "effects", "--signatures", "nosuch"]),
+        (1, &["gap", "effects", "--effect", "nosuch"]),
         (6, &["drift", &junk]),
         (1, &["nightly", "nosuch.yaml"]),
         (3, &["map", "fit", &table]),

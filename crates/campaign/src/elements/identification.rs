@@ -1,29 +1,23 @@
 //! `identification:` with its `window` and `stabilisation`.
 
 use crate::checking::Check;
-use crate::si_values::si;
+use crate::si_values::element;
 use crate::units::{Duration, Fraction, Kind, Quantity};
 use mapper_core::{ALPHA_AREA_SIGMA_RATIO, JointSettings, Method, SettleBands, WindowRule};
 use mapper_yaml::{FindingKind, steps};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Variations over the window within which a point counts as settled.
-#[derive(Default, Deserialize, JsonSchema)]
-#[serde(remote = "SettleBands", default, deny_unknown_fields)]
-pub(crate) struct SettleBandsElement {
-    /// Shaft speed; 0.8 % if none is given.
-    #[serde(rename = "speed", deserialize_with = "si::<Fraction, _>")]
-    #[schemars(with = "Quantity<Fraction>", extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.8 %")]
-    speed_ratio: f64,
-    /// Compressor flow; 1.5 % if none is given.
-    #[serde(rename = "flow", deserialize_with = "si::<Fraction, _>")]
-    #[schemars(with = "Quantity<Fraction>", extend("x-above" = "0 %", "x-max" = "100 %"), example = &"1.5 %")]
-    flow_ratio: f64,
-    /// Pressure ratio; 2 % if none is given.
-    #[serde(rename = "pressure_ratio", deserialize_with = "si::<Fraction, _>")]
-    #[schemars(with = "Quantity<Fraction>", extend("x-above" = "0 %", "x-max" = "100 %"), example = &"2 %")]
-    pressure_ratio_ratio: f64,
+element! {
+    /// Variations over the window within which a point counts as settled.
+    pub(crate) SettleBandsElement for SettleBands {
+        /// Shaft speed; 0.8 % if none is given.
+        speed => speed_ratio: Quantity<Fraction> [extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.8 %"];
+        /// Compressor flow; 1.5 % if none is given.
+        flow => flow_ratio: Quantity<Fraction> [extend("x-above" = "0 %", "x-max" = "100 %"), example = &"1.5 %"];
+        /// Pressure ratio; 2 % if none is given.
+        pressure_ratio => pressure_ratio_ratio: Quantity<Fraction> [extend("x-above" = "0 %", "x-max" = "100 %"), example = &"2 %"];
+    }
 }
 
 // Untagged: the type of the YAML node determines the variant, and the schema has been checked.
@@ -118,9 +112,7 @@ pub(crate) struct IdentificationFile {
     #[schemars(range(min = 0, max = 1), example = 0.15)]
     alpha_area_sigma: Option<f64>,
     /// Variations within which a point counts as settled.
-    #[serde(default, deserialize_with = "SettleBandsElement::deserialize")]
-    #[schemars(with = "SettleBandsElement")]
-    stabilisation: SettleBands,
+    stabilisation: Option<SettleBandsElement>,
     /// Parameters that `joint` identifies or keeps at their declared values; by default it identifies all.
     #[serde(default)]
     joint: JointSettings,
@@ -139,12 +131,14 @@ enum MethodName {
 impl IdentificationFile {
     /// With the machine's own alpha_A if the file does not give it.
     pub(crate) fn identification(self, alpha_area_ratio: f64) -> Identification {
+        let mut settle_bands = SettleBands::default();
+        self.stabilisation.unwrap_or_default().apply(&mut settle_bands);
         Identification {
             method: self.method.unwrap_or(Method::Joint),
             window: self.window.map_or(WindowRule::Auto, WindowRule::from),
             alpha_area_ratio: self.alpha_area.unwrap_or(alpha_area_ratio),
             alpha_area_sigma_ratio: self.alpha_area_sigma.unwrap_or(ALPHA_AREA_SIGMA_RATIO),
-            settle_bands: self.stabilisation,
+            settle_bands,
             joint: self.joint,
         }
     }
@@ -153,13 +147,16 @@ impl IdentificationFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::any_with;
+    use crate::testing::any;
     use mapper_core::Choice;
 
     #[test]
     fn what_is_left_out_keeps_its_default() {
-        let read = |text| any_with(text, SettleBandsElement::deserialize);
         let default = SettleBands::default();
+        let read = |text| {
+            let mut bands = default;
+            any::<SettleBandsElement>(text).map(|element| element.apply(&mut bands)).map(|()| bands)
+        };
         assert_eq!(read("{}").unwrap(), default);
         assert_eq!(read("{flow: 3 %}").unwrap(), SettleBands { flow_ratio: 0.03, ..default });
         assert!(read("{flow: 3}").is_err() && read("{fow: 3 %}").is_err());

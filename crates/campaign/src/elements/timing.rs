@@ -149,7 +149,6 @@ impl ZeroFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::any_with;
 
     #[test]
     fn what_is_written_and_what_it_means() {
@@ -166,7 +165,7 @@ mod tests {
             ("{dwell: 2 min, dwel: 2 min}", None),
         ];
         for (text, expected) in table {
-            let timing = any_with(text, TimingFile::deserialize).ok().map(TimingFile::timing);
+            let timing = crate::testing::any(text).ok().map(TimingFile::timing);
             assert_eq!(timing, expected, "{text}");
         }
     }

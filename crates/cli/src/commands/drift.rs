@@ -1,12 +1,11 @@
 //! `mapper drift`: searches recordings for drift of the rig.
 
-use crate::command_line::{channel_map, given_campaign};
+use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::{Code, Failure};
 use crate::output::standard_output;
 use crate::output::standard_output::Replace;
 use clap::Args;
-use mapper_campaign::Campaign;
 use mapper_report::{Describe, corrected_csv};
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, Session, SessionError, Versioned};
 use serde_json::json;
@@ -15,18 +14,11 @@ use std::path::PathBuf;
 /// Check whether the rig drifted while a map was made: which sensor, or the machine, since when and how fast
 #[derive(Debug, Args)]
 pub struct Drift {
-    /// Run directories, MCAP files or logs in chronological order; with `--recording`, their campaign
-    #[arg(required = true, value_name = "RECORDING|CAMPAIGN")]
-    pub paths: Vec<PathBuf>,
-    /// Recording, instead of by its place; may be given more than once
-    #[arg(long, value_name = "FILE", conflicts_with = "campaign")]
-    pub recording: Vec<PathBuf>,
-    /// Channel map: where recordings made by another program hold the rig's channels (YAML)
-    #[arg(long, value_name = "FILE")]
-    pub channels: Option<PathBuf>,
-    /// Campaign of the machine, if the recordings carry none
-    #[arg(long, value_name = "FILE")]
-    pub campaign: Option<PathBuf>,
+    /// Run directories, MCAP files or logs in chronological order
+    #[arg(required = true)]
+    pub recordings: Vec<PathBuf>,
+    #[command(flatten)]
+    pub reading: RecordingReading,
     /// Write the points corrected for drift to this new CSV file
     #[arg(long, value_name = "FILE")]
     pub corrected: Option<PathBuf>,
@@ -39,11 +31,10 @@ pub struct Drift {
 
 impl Drift {
     pub fn run(&self) -> Result<(), Failure> {
-        let (files, given) = self.sources()?;
-        let map = channel_map(self.channels.as_deref())?;
+        let (map, given) = self.reading.read()?;
         let registry = registry();
         let read = |file: &PathBuf| Recorded::read_run(&registry, file, &map, given.as_ref());
-        let runs = files.iter().map(read).collect::<Result<Vec<_>, SessionError>>()?;
+        let runs = self.recordings.iter().map(read).collect::<Result<Vec<_>, SessionError>>()?;
         let recorded: Vec<Recorded> = runs.into_iter().flatten().collect();
         // clap requires at least one.
         let Some(first) = recorded.first() else { return Ok(()) };
@@ -72,17 +63,5 @@ impl Drift {
         document.append(drift.zero.document());
         warnings.iter().for_each(|warning| document.text(format!("recording: {warning}")));
         standard_output::show(&document)
-    }
-
-    /// Recordings, and the campaign if one is given.
-    fn sources(&self) -> Result<(&[PathBuf], Option<Campaign>), Failure> {
-        let named = !self.recording.is_empty();
-        if named && self.paths.len() > 1 {
-            let message = "`--recording` needs exactly one campaign, that of the recorded machine";
-            return Err(Failure::new(Code::BadInput, message));
-        }
-        let (files, campaign) =
-            if named { (&self.recording, self.paths.first()) } else { (&self.paths, self.campaign.as_ref()) };
-        Ok((files, given_campaign(campaign.map(PathBuf::as_path))?))
     }
 }

@@ -1,11 +1,10 @@
 //! `mapper identify`: from recordings to points and a map, without a rig.
 
-use crate::command_line::{channel_map, given_campaign};
+use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::output::output_options::DetailArguments;
 use crate::output::standard_output;
-use crate::terminal::{identified_text, results_text};
+use crate::terminal::{DetailLevel, identified_text, results_text};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
 use mapper_report::with_messages;
@@ -21,17 +20,13 @@ pub struct Identify {
     /// Write the results of a run (points, map, pictures, report) to this directory; existing files are not replaced
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Channel map: where a recording made by another program holds the rig's channels (YAML)
-    #[arg(long, value_name = "FILE")]
-    pub channels: Option<PathBuf>,
-    /// Campaign with machine, sensors and window, instead of the one attached to the recording
-    #[arg(long, value_name = "FILE")]
-    pub campaign: Option<PathBuf>,
+    #[command(flatten)]
+    pub reading: RecordingReading,
     /// How to identify [default: the campaign's method, or joint]
     #[arg(long, value_enum)]
     pub method: Option<MethodArgument>,
     #[command(flatten)]
-    pub shown: DetailArguments,
+    pub shown: DetailLevel,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -42,8 +37,7 @@ const FULL_COMMAND: &str = "the same command with `--full`";
 
 impl Identify {
     pub fn run(&self) -> Result<(), Failure> {
-        let map = channel_map(self.channels.as_deref())?;
-        let given = given_campaign(self.campaign.as_deref())?;
+        let (map, given) = self.reading.read()?;
         let registry = registry();
         let read = |path: &PathBuf| Recorded::read_run(&registry, path, &map, given.as_ref());
         let runs = self.recordings.iter().map(read).collect::<Result<Vec<_>, _>>()?;
@@ -63,7 +57,7 @@ impl Identify {
                     &display,
                     &results,
                     FULL_COMMAND,
-                    self.shown.detail_level(),
+                    self.shown,
                 )),
             };
         }
@@ -78,7 +72,7 @@ impl Identify {
                 &identified,
                 FULL_COMMAND,
                 &warnings,
-                self.shown.detail_level(),
+                self.shown,
             )),
         }
     }

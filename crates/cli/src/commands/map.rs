@@ -1,6 +1,6 @@
 //! `mapper map`: maps are inspected, fitted, converted, compared, reduced and exported.
 
-use crate::command_line::{MapReading, channel_map, given_campaign, reference, subcommands};
+use crate::command_line::{MapReading, RecordingReading, reference, subcommands};
 use crate::environment::registry;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
@@ -24,7 +24,6 @@ subcommands! { MapCommand:
     Convert,
     Compare,
     Reduce,
-    Correct,
     Rig,
     Fmu,
 }
@@ -115,28 +114,6 @@ impl Convert {
     }
 }
 
-/// Remove heat transfer from the apparent efficiencies of a map measured hot, using only the map (Sirakov and Casey)
-#[derive(Debug, Args)]
-pub struct Correct {
-    /// Map, in any layout that `mapper map inspect` understands with apparent efficiencies
-    pub map: PathBuf,
-    #[command(flatten)]
-    pub reading: MapReading,
-    /// Heat flow to the gas at the reference state, W, instead of the estimate from the map
-    #[arg(long, value_name = "W")]
-    pub heat: Option<f64>,
-    #[command(flatten)]
-    pub target: MapTarget,
-}
-
-impl Correct {
-    pub fn run(&self) -> Result<(), Failure> {
-        let description = self.reading.description()?;
-        let work = registry().correct_map_file(&self.map, &description, self.heat, self.target.map())?;
-        standard_output::print_map_work(&work, self.target.json)
-    }
-}
-
 /// Fit all speed lines together and print the error at each line when it is left out
 #[derive(Debug, Args)]
 pub struct Fit {
@@ -181,12 +158,8 @@ pub struct Fmu {
     /// Compile the sources for this computer too, by the compiler in CC [default: cc]
     #[arg(long)]
     pub compile: bool,
-    /// Channel map: where a recording made by another program holds the rig's channels (YAML)
-    #[arg(long, value_name = "FILE")]
-    pub channels: Option<PathBuf>,
-    /// Campaign with machine, sensors and window, instead of the one attached to the recording
-    #[arg(long, value_name = "FILE")]
-    pub campaign: Option<PathBuf>,
+    #[command(flatten)]
+    pub reading: RecordingReading,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -203,8 +176,7 @@ impl Fmu {
             let campaign = mapper_campaign::load(&self.machine).map_err(Failure::of_campaign)?;
             session.nominal_fmu(&campaign, self.compile, &self.out, existing)?
         } else {
-            let given = given_campaign(self.campaign.as_deref())?;
-            let map = channel_map(self.channels.as_deref())?;
+            let (map, given) = self.reading.read()?;
             let recorded = Recorded::read_run(&registry, &self.machine, &map, given.as_ref())?;
             session.identified_fmu(recorded, &map, self.compile, &self.out, existing)?
         };
@@ -290,12 +262,8 @@ pub struct Rig {
     /// Directory for the files; existing files are not replaced
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Channel map: where a recording made by another program holds the rig's channels (YAML)
-    #[arg(long, value_name = "FILE")]
-    pub channels: Option<PathBuf>,
-    /// Campaign with machine, sensors and window, instead of the one attached to the recording
-    #[arg(long, value_name = "FILE")]
-    pub campaign: Option<PathBuf>,
+    #[command(flatten)]
+    pub reading: RecordingReading,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -304,8 +272,7 @@ pub struct Rig {
 impl Rig {
     /// Identifies a recording by its campaign's method and writes thermal model, turbine and pictures.
     pub fn run(&self) -> Result<(), Failure> {
-        let given = given_campaign(self.campaign.as_deref())?;
-        let map = channel_map(self.channels.as_deref())?;
+        let (map, given) = self.reading.read()?;
         let registry = registry();
         let recorded = Recorded::read_run(&registry, &self.recording, &map, given.as_ref())?;
         let written = Session::new(&registry).rig_files(recorded, &map, &self.out)?;

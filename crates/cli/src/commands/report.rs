@@ -1,6 +1,6 @@
 //! `mapper report`: the page of a run, with other runs for comparison.
 
-use crate::command_line::{channel_map, given_campaign};
+use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::{Code, Failure};
 use crate::output::standard_output::Replace;
@@ -20,12 +20,8 @@ pub struct Report {
     /// Write the page here [default: RUN/report.html for one run directory, otherwise report.html]
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Channel map: where recordings made by another program hold the rig's channels (YAML)
-    #[arg(long, value_name = "FILE")]
-    pub channels: Option<PathBuf>,
-    /// Campaign with machine, sensors and window, instead of the one attached to the recordings
-    #[arg(long, value_name = "FILE")]
-    pub campaign: Option<PathBuf>,
+    #[command(flatten)]
+    pub reading: RecordingReading,
     /// Also diagnose the gap between the first run and the nominal model of this campaign, which takes up to a minute
     #[arg(long, value_name = "CAMPAIGN")]
     pub gap: Option<PathBuf>,
@@ -49,8 +45,7 @@ impl Report {
         let is_own = self.out.is_none() && out.parent().is_some_and(|parent| !parent.as_os_str().is_empty());
         let replace = Replace { force: self.replace.force || is_own };
         replace.existing().check(&out)?;
-        let map = channel_map(self.channels.as_deref())?;
-        let given = given_campaign(self.campaign.as_deref())?;
+        let (map, given) = self.reading.read()?;
         let registry = registry();
         let read = |path: &PathBuf| Recorded::read_run(&registry, path, &map, given.as_ref());
         let mut runs = self.runs.iter().map(read).collect::<Result<Vec<_>, _>>()?;

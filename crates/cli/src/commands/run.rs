@@ -3,20 +3,17 @@
 use crate::environment::{SystemClock, registry, rig_states_directory, today};
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
-use crate::output::output_options::DetailArguments;
 use crate::output::{output_options, standard_output};
-use crate::terminal::results_text;
+use crate::terminal::{DetailLevel, results_text};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, RunEnding, Trip, Verdict};
-#[cfg(feature = "foxglove")]
-use mapper_live::parse_local_address;
-use mapper_live::{LiveError, LiveRun, ObserverRequest, Observers, TlsFiles, parse_address};
+use mapper_live::{Live, LiveRun, TlsFiles, parse_address};
 use mapper_report::{plan_document, with_messages};
 use mapper_session::recording::run_directory;
 use mapper_session::{
     InterruptedRun, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session, SessionError,
-    SessionEvent, load_on, soak_s, start_time_ns,
+    SessionEvent, load_on, soak_s,
 };
 use serde_json::json;
 use std::net::SocketAddr;
@@ -56,12 +53,8 @@ pub struct Run {
     /// Private key of that certificate (PEM)
     #[arg(long, value_name = "FILE", requires = "live_cert", hide_short_help = true)]
     pub live_key: Option<PathBuf>,
-    /// Send readings, steps and points to Foxglove or Lichtblick on this machine
-    #[cfg(feature = "foxglove")]
-    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "8765", value_parser = parse_local_address)]
-    pub foxglove: Option<SocketAddr>,
     #[command(flatten)]
-    pub shown: DetailArguments,
+    pub shown: DetailLevel,
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -85,18 +78,21 @@ impl Run {
         progress.begin("planning");
         let states = rig_states_directory(None);
         let started_ns = u64::try_from(started.as_nanosecond()).unwrap_or(0);
-        let observers = self.observers().map_err(Failure::of_live)?;
+        let tls = self.live_cert.clone().zip(self.live_key.clone());
+        let tls = tls.map(|(certificate, key)| TlsFiles { certificate, key });
+        let live = self.live.map(|address| Live::open(address, tls.as_ref())).transpose();
+        let live = live.map_err(Failure::of_live)?;
         let on_event = |event: &SessionEvent| {
             if matches!(event, SessionEvent::RigReleased) {
                 stop.enter(Phase::Results);
             }
             progress.show(event);
-            observers.show(event);
+            live.iter().for_each(|live| live.show(event));
         };
         let operator = Arc::new(Operator::default());
         let session = Session {
-            operator: observers.has_operator_controls().then_some(&*operator),
-            estimates: observers.show_points(),
+            operator: live.is_some().then_some(&*operator),
+            estimates: live.is_some(),
             registry: &registry,
             on_event: &on_event,
             stop: &stop.now,
@@ -123,14 +119,14 @@ impl Run {
             campaign: &campaign,
             plan: prepared.plan(),
             pace,
-            channels: &prepared.rig().channels,
-            start_time_ns: start_time_ns(&prepared.rig(), started_ns),
             operator: operator.clone(),
             after_step: stop.after_step.clone(),
             now: stop.now.clone(),
         };
-        for line in observers.start(&live_run).map_err(Failure::of_live)? {
-            standard_output::warn(&format!("{line}\n"));
+        if let Some(live) = &live {
+            live.start(&live_run).map_err(Failure::of_live)?;
+            live.warning().iter().for_each(|warning| standard_output::warn(&format!("warning: {warning}\n")));
+            standard_output::warn(&format!("live page: {}\n", live.url()));
         }
         let outcome = match pace {
             Some(pace) => {
@@ -139,19 +135,11 @@ impl Run {
             None => prepared.run(&session)?,
         };
         progress.clear();
-        observers
-            .end(&outcome.sentence(), outcome.results.as_ref().ok().map(|results| results.page.as_path()));
+        if let Some(live) = &live {
+            let page = outcome.results.as_ref().ok().map(|results| results.page.as_path());
+            live.end(&outcome.sentence(), page);
+        }
         self.report_outcome(&campaign, outcome)
-    }
-
-    fn observers(&self) -> Result<Observers, LiveError> {
-        let tls = self.live_cert.clone().zip(self.live_key.clone());
-        Observers::open(ObserverRequest {
-            page: self.live,
-            tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
-            #[cfg(feature = "foxglove")]
-            foxglove: self.foxglove,
-        })
     }
 
     fn report_outcome(&self, campaign: &Campaign, outcome: RunOutcome) -> Result<(), Failure> {
@@ -184,7 +172,7 @@ impl Run {
                     &campaign.display,
                     &results,
                     &full_command,
-                    self.shown.detail_level(),
+                    self.shown,
                 ))?;
             }
             // Without results, only the reason for the stop matters.

@@ -1,6 +1,6 @@
 //! `mapper transient`: diagnoses a log without steady steps.
 
-use crate::command_line::{channel_map, given_campaign};
+use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
@@ -15,12 +15,8 @@ use std::path::PathBuf;
 pub struct Transient {
     /// Run directory, MCAP file, or log of another program (see `mapper log inspect`)
     pub recording: PathBuf,
-    /// Channel map: where a recording made by another program holds the channels (YAML)
-    #[arg(long, value_name = "FILE")]
-    pub channels: Option<PathBuf>,
-    /// Campaign with the machine and its geometry, instead of the one attached to the recording
-    #[arg(long, value_name = "FILE")]
-    pub campaign: Option<PathBuf>,
+    #[command(flatten)]
+    pub reading: RecordingReading,
     /// Fit the log up to this time and predict the rest, e.g. "13.2 s" [default: fit everything]
     #[arg(long, value_name = "TIME", value_parser = parse_time_s)]
     pub fit_until: Option<f64>,
@@ -48,8 +44,7 @@ fn parse_time_s(text: &str) -> Result<f64, String> {
 
 impl Transient {
     pub fn run(&self) -> Result<(), Failure> {
-        let map = channel_map(self.channels.as_deref())?;
-        let given = given_campaign(self.campaign.as_deref())?;
+        let (map, given) = self.reading.read()?;
         let registry = registry();
         let recorded = Recorded::read(&registry, &self.recording, &map, given.as_ref())?;
         let effects = registry.effects_with(&self.effects)?;

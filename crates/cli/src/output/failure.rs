@@ -7,7 +7,6 @@ use mapper_core::{ExportError, ImportError};
 use mapper_fleet::{FleetError, StudyFileError};
 use mapper_history::HistoryError;
 use mapper_live::LiveError;
-use mapper_maps::HeatCorrectionError as Heat;
 use mapper_recording::RecordError;
 use mapper_session::{
     ErrorKind, FirstMapError, FmuExportError, MapWorkError, SessionError, SessionError as E,
@@ -273,10 +272,6 @@ pub fn command_for(error: &E) -> Option<String> {
         E::FirstMap(error) if matches!(**error, FirstMapError::NotAMap(..)) => "`mapper map convert`",
         E::Fmu(FmuExportError::Platform | FmuExportError::Compiler { .. }) => "without `--compile`",
         E::MapWork(MapWorkError::NotMeasured(_)) => "`mapper map inspect`",
-        E::MapWork(MapWorkError::NotCorrected(
-            _,
-            Heat::TooFew { .. } | Heat::OneSpeed { .. } | Heat::Singular,
-        )) => "`--heat WATTS`",
         E::MapWork(MapWorkError::NoDefinition) => "`--efficiency DEFINITION`",
         E::Import(_, source) => match source {
             ImportError::NoUnit { .. } | ImportError::FlowUnit => "`--with KEY=VALUE`",

@@ -1,11 +1,9 @@
-//! Options that every command has, and those for more detail.
+//! Options that every command has.
 
-use crate::terminal::{
-    ColourChoice, DetailLevel, Progress, ProgressFormat, is_coloured, understands_escapes,
-};
+use crate::terminal::{Progress, ProgressFormat};
 use clap::{ArgMatches, Args, ColorChoice};
 use mapper_report::Paint;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::io::IsTerminal;
 use std::sync::OnceLock;
 
@@ -22,7 +20,7 @@ pub struct OutputOptions {
 
 #[derive(Debug, Clone, Copy, Default)]
 struct ChosenOptions {
-    colour: ColourChoice,
+    colour: ColorChoice,
     progress: Option<ProgressFormat>,
     json: bool,
     replaces: bool,
@@ -39,18 +37,13 @@ fn chosen_options() -> ChosenOptions {
 
 /// Stores the chosen options for all later output.
 pub fn set_options(arguments: &OutputOptions, matches: &ArgMatches) {
-    let colour = match arguments.color {
-        ColorChoice::Auto => ColourChoice::Auto,
-        ColorChoice::Always => ColourChoice::Always,
-        ColorChoice::Never => ColourChoice::Never,
-    };
     let progress = arguments.progress.as_deref().map(ProgressFormat::from_name);
     let command = std::iter::successors(Some(matches), |of| of.subcommand().map(|(_, deeper)| deeper)).last();
     let json =
         command.is_some_and(|of| of.try_get_one::<bool>("json").ok().flatten().is_some_and(|json| *json));
     let replaces = command.is_some_and(|of| of.try_contains_id("force").unwrap_or(false));
     // It is kept once: `main` alone calls this.
-    let _ = CHOSEN.set(ChosenOptions { colour, progress, json, replaces });
+    let _ = CHOSEN.set(ChosenOptions { colour: arguments.color, progress, json, replaces });
 }
 
 /// Whether invalid arguments request JSON, and their choice of colours.
@@ -101,8 +94,22 @@ fn shows_escapes(stream: &impl IsTerminal) -> bool {
     stream.is_terminal() && understands_escapes(std::env::var_os("TERM").as_deref())
 }
 
+/// Whether a terminal understands escape sequences, by the environment variable `TERM`: `dumb` is a printer, or an editor's shell.
+fn understands_escapes(term: Option<&OsStr>) -> bool {
+    term.is_none_or(|term| term != "dumb")
+}
+
 fn coloured(terminal: bool) -> bool {
     is_coloured(chosen_options().colour, terminal, std::env::var_os("NO_COLOR").as_deref())
+}
+
+/// Whether the output is coloured. `no_color`: the environment variable of that name (no-color.org).
+fn is_coloured(choice: ColorChoice, to_terminal: bool, no_color: Option<&OsStr>) -> bool {
+    match choice {
+        ColorChoice::Always => true,
+        ColorChoice::Never => false,
+        ColorChoice::Auto => to_terminal && no_color.is_none_or(OsStr::is_empty),
+    }
 }
 
 /// The display of progress.
@@ -115,19 +122,25 @@ pub fn progress() -> Progress {
     Progress::new(chosen_options().progress.unwrap_or(default_format))
 }
 
-/// Options of commands that print identified points.
-#[derive(Debug, Args)]
-pub struct DetailArguments {
-    /// Show everything: wide tables, common parameters, repeats, sensors, the zero
-    #[arg(long)]
-    pub full: bool,
-    /// Show the simulator's truth next to the points
-    #[arg(long)]
-    pub truth: bool,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl DetailArguments {
-    pub fn detail_level(&self) -> DetailLevel {
-        DetailLevel { full: self.full, truth: self.truth }
+    #[test]
+    fn a_dumb_terminal_gets_no_escapes() {
+        assert!(!understands_escapes(Some(OsStr::new("dumb"))));
+        assert!(understands_escapes(Some(OsStr::new("xterm-256color"))));
+        assert!(understands_escapes(None));
+    }
+
+    #[test]
+    fn what_was_asked_for_outranks_the_environment_and_an_empty_no_color_is_none() {
+        let set = Some(OsStr::new("1"));
+        assert!(is_coloured(ColorChoice::Always, false, set));
+        assert!(!is_coloured(ColorChoice::Never, true, None));
+        assert!(is_coloured(ColorChoice::Auto, true, None));
+        assert!(!is_coloured(ColorChoice::Auto, true, set));
+        assert!(is_coloured(ColorChoice::Auto, true, Some(OsStr::new(""))));
+        assert!(!is_coloured(ColorChoice::Auto, false, None));
     }
 }

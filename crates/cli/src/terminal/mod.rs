@@ -3,10 +3,8 @@
 //! Progress goes to standard error and never into results: a bar on a terminal, a line per step in a pipe, JSON lines for
 //! a program.
 
-mod colour;
 mod progress;
 mod results_text;
 
-pub use colour::{ColourChoice, is_coloured, understands_escapes};
 pub use progress::{Progress, ProgressFormat};
 pub use results_text::{DetailLevel, identified_text, results_text};

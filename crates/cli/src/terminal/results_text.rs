@@ -1,15 +1,18 @@
 //! Results of a run or an identification, for a terminal.
 
+use clap::Args;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_report::{Display, Document, PointResults};
 use mapper_session::{Identified, Results};
 
-/// Level of detail.
-#[derive(Debug, Clone, Copy, Default)]
+/// Options of commands that print identified points.
+#[derive(Debug, Clone, Copy, Args)]
 pub struct DetailLevel {
-    /// Everything, in tables as wide as they need to be.
+    /// Show everything: wide tables, common parameters, repeats, sensors, the zero
+    #[arg(long)]
     pub full: bool,
-    /// The simulator's truth next to each value.
+    /// Show the simulator's truth next to the points
+    #[arg(long)]
     pub truth: bool,
 }
 

@@ -79,8 +79,6 @@ Warning {
     "assumed_alpha" AssumedAlpha { alpha_area_ratio: f64, alpha_area_sigma_ratio: f64, eta_sigma: f64 },
     /// No sensor uncertainty is declared.
     "nothing_declared" NothingDeclared,
-    /// The efficiency of a hot map was corrected without heat data.
-    "heat_corrected" HeatCorrected(HeatCorrected),
 
     /// The step is excluded from the shared parameters.
     "left_out" LeftOut(LeftOut),
@@ -187,13 +185,6 @@ kinds! {
         Noise { residual_k: f64, noise_k: f64 },
         /// The residual of T2 is systematic: it remains in means over `block_s`, while T2 changes by `dt2_k`.
         Shape { residual_k: f64, block_s: f64, dt2_k: f64 },
-    }
-    /// Result of a heat correction.
-    HeatCorrected {
-        /// Corrected with one heat flow for the whole map.
-        Corrected { apparent_eta: f64 },
-        /// Without this heat flow the efficiency would be too high.
-        TooMuchHeat { heat_w: f64 },
     }
     /// Reason for excluding a step from the shared parameters.
     LeftOut {

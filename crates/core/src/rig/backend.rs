@@ -31,7 +31,7 @@ pub struct Setpoints {
 }
 
 /// A rig's description before the backend is armed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RigDescription {
     /// Name of the backend, e.g. `virtual_lab`.
     pub backend: String,

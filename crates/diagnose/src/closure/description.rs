@@ -1,9 +1,9 @@
 //! A closure term as a sentence with numbers, and as an effect script.
 
 use crate::closure::balance::Balance;
-use crate::closure::candidate::FittedClosure;
 use crate::closure::expression::Expression;
 use crate::closure::library::REFERENCE_K;
+use crate::closure::select::FittedClosure;
 use crate::closure::term::{Role, Term};
 use crate::gap::findings::report::ClosureCoefficient;
 use mapper_core::unit_factors::ICE_POINT_K;

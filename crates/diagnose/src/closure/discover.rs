@@ -1,12 +1,12 @@
 //! Searches for closure terms that explain the residual of a diagnosis, and locates their source terms.
 
 use crate::closure::balance::{Balance, Properties};
-use crate::closure::candidate::{FittedClosure, TermSearch, keep_determined, promising};
 use crate::closure::columns::{Base, Products};
 use crate::closure::description::{ClosureDescription, describe, script_of};
 use crate::closure::library as term_library;
 use crate::closure::residual_source::{ResidualSource, residual_sources};
 use crate::closure::select::{Choice, begun, choices};
+use crate::closure::select::{FittedClosure, TermSearch, keep_determined, promising};
 use crate::gap::best_fit::adequacy::{adequacy, misfit_of_steps};
 use crate::gap::best_fit::fit::{Effort, Fit, fit, with_start_read};
 use crate::gap::best_fit::normal::Selection;

@@ -2,9 +2,7 @@
 //! the method and its limits.
 
 pub(crate) mod balance;
-pub(crate) mod candidate;
 pub(crate) mod columns;
-pub(crate) mod confounding;
 pub(crate) mod description;
 pub(crate) mod discover;
 pub(crate) mod expression;

@@ -2,9 +2,9 @@
 
 use crate::drift::causes::{Cause, CauseKind, Drift};
 use crate::drift::correction::{corrected_points, group, identified};
-use crate::drift::decide::{Decision, DetectedCause};
 use crate::drift::drive::{Drive, predict};
 use crate::drift::readings::{Readings, Response, SegmentMeans};
+use crate::drift::refinement::{Decision, DetectedCause};
 use crate::drift::refinement::{FittedDrift, Refinement};
 use crate::drift::report::{DriftReport, DriftVerdict, FoundDrift, RateOrStep};
 use crate::drift::runs;

@@ -4,7 +4,7 @@ use crate::drift::causes::Drift;
 use crate::drift::runs::{CampaignStep, DriftError, DriftRequest, SEGMENTS, Segment};
 use mapper_core::{Channel, Dimension, Recording};
 use mapper_numerics::parallel;
-use mapper_observe::averages::mean_reading::{BEFORE_S, mean_between};
+use mapper_observe::averages::{BEFORE_S, mean_between};
 use mapper_observe::channels::OUTPUTS;
 use mapper_observe::initial_state::estimate_state;
 use mapper_observe::model_inputs::averaged_inputs::AveragedInputs;

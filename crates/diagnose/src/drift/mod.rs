@@ -7,9 +7,7 @@
 
 mod candidates;
 mod causes;
-mod constants;
 mod correction;
-mod decide;
 mod diagnose;
 mod drive;
 mod readings;

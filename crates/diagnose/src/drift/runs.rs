@@ -8,8 +8,7 @@ use mapper_core::{
 use mapper_identify::{IdentifyConfig, LONGEST_BRIDGE_S};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_numerics::statistics::median;
-use mapper_observe::averages::mean_reading::{BEFORE_S, mean_between};
-use mapper_observe::averages::schedule::Schedule;
+use mapper_observe::averages::{BEFORE_S, Schedule, mean_between};
 use mapper_observe::channels::{INPUT_CHANNELS, OUTPUTS};
 use mapper_observe::declared::Declared;
 use mapper_physics::machine::params::BoundaryConditions;

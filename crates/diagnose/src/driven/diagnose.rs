@@ -3,10 +3,10 @@
 use crate::driven::DrivenError;
 use crate::driven::compressor::CompressorSide;
 use crate::driven::denoise::denoised;
-use crate::driven::detectable::{diagnosable, smallest};
 use crate::driven::fit::{SideFit, SideProblem};
 use crate::driven::held_out::{beyond, held_out, phases, residual_rms_k};
 use crate::driven::log_rows::Rows;
+use crate::driven::search::{diagnosable, smallest};
 use crate::driven::search::{probabilities, search};
 use crate::driven::side::{Side, SideModel};
 use crate::driven::side_diagnosis::{ChannelTrace, Diagnosis, SideCause, SideVerdict, Unknown};

@@ -8,7 +8,6 @@
 
 pub(crate) mod compressor;
 mod denoise;
-mod detectable;
 mod diagnose;
 mod fit;
 mod held_out;
@@ -20,7 +19,7 @@ pub(crate) mod turbine;
 
 pub use diagnose::{SideRequest, diagnose};
 pub use side::Side;
-pub use side_diagnosis::{Beyond, Diagnosis, HeldOut, Phase, SideCause, SideVerdict, Unknown};
+pub use side_diagnosis::{Beyond, Diagnosis, HeldOut, SideCause, SideVerdict, Unknown};
 
 use mapper_core::RecordingError;
 

@@ -1,17 +1,23 @@
 //! The consequence of a diagnosis for the map: identified again without the causes if they are certain enough, else with wider intervals.
 
 use crate::drift::without_drift;
-use crate::gap::best_fit::coordinate::infos;
+use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, infos, unknowns};
 use crate::gap::best_fit::fit::Fit;
-use crate::gap::correction::{Changes, one_sigma_away};
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::findings::report::{Candidate, Verdict};
 use crate::gap::preconditions::GapError;
-use crate::gap::residuals::study::Hypothesis;
+use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS};
+use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
 use mapper_core::{
-    BudgetRow, IdentifiedPoint, PointBudgets, Recording, UncertaintyBudget, half_width_95, step_number,
+    BudgetRow, Channel, IdentifiedPoint, PointBudgets, Recording, Series, UncertaintyBudget, half_width_95,
+    step_number,
 };
+use mapper_observe::channels::{INPUT_CHANNELS, boundary_condition};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::rig::effect::{EffectError, Rig};
+use mapper_physics::simulation::inputs::Inputs;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// A map before and after its correction for causes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -305,4 +311,96 @@ fn correction_of(
         after: after.and_then(eta),
         correction_sigma,
     }
+}
+
+/// Effect of causes on the readings of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Changes {
+    /// Start of the first step, s. Earlier readings, from which a zero may have been taken, stay unchanged.
+    start_s: f64,
+    /// Change of each channel along the recording, in its unit.
+    channels: BTreeMap<Channel, Series>,
+}
+
+impl Changes {
+    /// The changes of a study's readings by the effects of a hypothesis.
+    ///
+    /// # Errors
+    /// [`PredictError`] if the model cannot follow.
+    pub(crate) fn of(study: &Study, hypothesis: &Hypothesis) -> Result<Changes, PredictError> {
+        let (start_s, end_s) = study.followed_s();
+        let times_s = study.table.t_s[study.table.range(start_s, end_s)].to_vec();
+        let with = |step: usize| study.rig(hypothesis, step);
+        // An error of an input sensor does not act on the machine: the true inputs are equal in both runs.
+        let bare = Hypothesis { effects: Vec::new(), ..hypothesis.clone() };
+        let without = |step: usize| -> Result<(Rig, Circumstances), EffectError> {
+            let (rig, circumstances) = study.rig(&bare, step)?;
+            let Circumstances { perturbations, paths, .. } = with(step)?.1;
+            Ok((rig, Circumstances { perturbations, paths, ..circumstances }))
+        };
+        let mut changes = vec![vec![0.0; times_s.len()]; OUTPUTS.len()];
+        study.read(hypothesis, with, &times_s, |index, output, reading, _| {
+            changes[output][index] += reading;
+        })?;
+        study.read(hypothesis, without, &times_s, |index, output, reading, _| {
+            changes[output][index] -= reading;
+        })?;
+        let series = |values: Vec<f64>| Series { t_s: times_s.clone(), values };
+        // P3 is also an input, of which only the error of its sensor counts.
+        let outputs = OUTPUTS.iter().zip(changes).filter(|(channel, _)| !INPUT_CHANNELS.contains(channel));
+        let mut channels: BTreeMap<Channel, Series> =
+            outputs.map(|(channel, values)| (*channel, series(values))).collect();
+        let mut of_inputs = INPUT_CHANNELS.map(|_| Vec::with_capacity(times_s.len()));
+        for t_s in &times_s {
+            let step = study.steps.iter().rposition(|step| step.marker.start_s <= *t_s).unwrap_or(0);
+            let inputs = |hypothesis: &Hypothesis| -> Result<BoundaryConditions, EffectError> {
+                Ok(study.true_inputs(&study.rig(hypothesis, step)?.1).at(*t_s))
+            };
+            let (mut with, mut without) = (inputs(hypothesis)?, inputs(&bare)?);
+            for (channel, values) in INPUT_CHANNELS.into_iter().zip(&mut of_inputs) {
+                let value = |boundary: &mut BoundaryConditions| {
+                    boundary_condition(boundary, channel).map_or(0.0, |value| *value)
+                };
+                values.push(value(&mut without) - value(&mut with));
+            }
+        }
+        channels.extend(
+            INPUT_CHANNELS.into_iter().zip(of_inputs).map(|(channel, values)| (channel, series(values))),
+        );
+        channels.retain(|_, change| change.values.iter().any(|value| *value != 0.0));
+        let start_s = study.steps.first().map_or(start_s, |first| first.marker.start_s);
+        Ok(Changes { start_s, channels })
+    }
+
+    /// The recording without these changes. At the start of the first step and the end of the last, which the model does not follow, the nearest change is
+    /// used.
+    pub(crate) fn subtracted_from(&self, mut recording: Recording) -> Recording {
+        for (channel, change) in &self.channels {
+            let own = recording.series.get_mut(channel).into_iter();
+            let elements = recording.elements.iter_mut().filter(|(element, _)| element.channel == *channel);
+            for series in own.chain(elements.map(|(_, series)| series)) {
+                for index in series.range(self.start_s, f64::INFINITY) {
+                    series.values[index] -= change.interpolate(series.t_s[index]).unwrap_or(0.0);
+                }
+            }
+        }
+        recording
+    }
+}
+
+/// The hypotheses one standard deviation away, in each independent direction of the uncertainty of a fit's effects; `None` if the recording does not
+/// determine the effects.
+pub(crate) fn one_sigma_away(study: &Study, fit: &Fit) -> Option<Vec<Hypothesis>> {
+    let coordinates = coordinates(&study.effects, &fit.hypothesis);
+    let mode = unknowns(&fit.hypothesis, &coordinates);
+    let nuisances = fit.hypothesis.nuisances.len();
+    let root = fit.covariance.clone().cholesky()?.l();
+    let moved = root.column_iter().map(|direction| {
+        let mut moved = mode.clone();
+        for (index, by) in direction.iter().enumerate() {
+            moved[nuisances + index] += by;
+        }
+        hypothesis_at(&fit.hypothesis, &coordinates, &moved)
+    });
+    Some(moved.collect())
 }

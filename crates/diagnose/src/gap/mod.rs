@@ -5,11 +5,9 @@ pub(crate) mod best_fit;
 pub(crate) mod calibrated_model;
 pub(crate) mod causes;
 pub(crate) mod consequence;
-pub(crate) mod correction;
 pub(crate) mod diagnose;
 pub(crate) mod findings;
 pub(crate) mod gap_reduction;
-pub(crate) mod joint;
 pub(crate) mod library_fits;
 pub(crate) mod model_error;
 pub(crate) mod next_experiment;
@@ -21,7 +19,7 @@ pub(crate) mod scores;
 pub(crate) mod verdict;
 
 pub use crate::gap::model_error::baseline::Baseline;
-pub use crate::gap::preconditions::{GapError, Problem};
+pub use crate::gap::preconditions::GapError;
 pub use calibrated_model::{
     CalibratedModelError, Expected, ForecastCheck, Found, FoundEffect, FoundTolerance,
 };
@@ -34,7 +32,6 @@ pub use findings::report::{
     SmallestSeen, Suggestion, Verdict,
 };
 pub use findings::warning::{GapWarning, OffsetAtRest};
-pub use joint::{Over, Persistence, Value};
 pub use request::{BaselineRecording, ClosureSearch, GapRequest, RigRecording};
 pub use residuals::study::Study;
 pub use scores::{EffectVisibility, Scores};

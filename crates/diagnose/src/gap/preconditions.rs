@@ -9,7 +9,7 @@ use mapper_core::{
     Channel, Implausible, Recording, StepMarker, check_running, is_commanded_jump, step_number,
 };
 use mapper_numerics::statistics::median;
-use mapper_observe::averages::time_table::{GAP_INTERVALS, Table};
+use mapper_observe::averages::{GAP_INTERVALS, Table};
 use mapper_observe::channels::INPUT_CHANNELS;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::lagged_command::Response;

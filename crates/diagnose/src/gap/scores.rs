@@ -1,6 +1,5 @@
-//! What a calibration needs of a diagnosis whose causes are known, and how visible causes are before a rig runs.
+//! What a calibration needs of a diagnosis whose causes are known, and how visible causes are on a recording.
 
-use crate::closure::confounding::{Signatures, signatures};
 use crate::gap::best_fit::coordinate::coordinates;
 use crate::gap::best_fit::fit::{Fit, lengths};
 use crate::gap::causes::calibration::Calibration;
@@ -10,7 +9,7 @@ use crate::gap::preconditions::{GapError, Problem};
 use crate::gap::request::RigRecording;
 use crate::gap::residuals::study::{EffectValues, Study, members};
 use crate::gap::residuals::whiten::Linearised;
-use mapper_observe::averages::time_table::Table;
+use mapper_observe::averages::Table;
 use mapper_physics::rig::effect::Effect;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -92,10 +91,5 @@ impl EffectVisibility {
         let values: Option<EffectValues> =
             causes.iter().map(|(id, values)| Some((index_of(id)?, values.clone()))).collect();
         lengths(&self.study, &self.linearised, &values?).ok()
-    }
-
-    /// How well a closure term in one balance could imitate each effect.
-    pub fn by_balance(&self) -> Signatures {
-        signatures(&self.study, &self.linearised)
     }
 }

@@ -5,6 +5,8 @@ mod convert;
 mod frame;
 mod message;
 mod samples;
+#[cfg(test)]
+#[path = "../../tests/inside/schema.rs"]
 mod schema;
 
 pub use crate::protocol::convert::{read_error, write_error};

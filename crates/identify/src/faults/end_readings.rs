@@ -4,7 +4,7 @@ use crate::IdentifyConfig;
 use crate::reading_checks::ends::Ends;
 use mapper_core::{Channel, Recording};
 use mapper_physics::gas::air::Air;
-use mapper_physics::rig::sensor_fault::Rest;
+use mapper_physics::rig::sensor_fault::ExactReadings;
 
 /// Maximum number of correlated rows, evenly spread. Bound: the cost grows with the cube, and these take a second.
 pub const MAX_CORRELATED_ROWS: usize = 500;
@@ -30,7 +30,7 @@ pub(crate) struct Readings {
     /// Time since the first step's start over the whole run's length.
     pub(crate) run_ratio: f64,
     /// As in [`IdentifyConfig`].
-    pub(crate) rest: Rest,
+    pub(crate) rest: ExactReadings,
     /// The compressed air.
     pub(crate) air: Air,
 }
@@ -46,7 +46,7 @@ pub(crate) fn span_s(recording: &Recording) -> Option<(f64, f64)> {
 const DIFFERENCES: PerChannel = [0.05, 0.05, 0.05, 20.0, 20.0, 1e-5, 20.0];
 
 impl Readings {
-    pub(crate) fn of(end: &Ends, first_s: f64, last_s: f64, rest: Rest) -> Self {
+    pub(crate) fn of(end: &Ends, first_s: f64, last_s: f64, rest: ExactReadings) -> Self {
         Readings {
             values: [
                 end.t1_k,

@@ -29,7 +29,7 @@ use mapper_inference::hypotheses::{Likelihood, Member, Priors};
 use mapper_inference::mixture::MIN_WEIGHT;
 use mapper_inference::posterior::EXCLUDED_ODDS;
 use mapper_numerics::statistics::EXCLUDE_SIGMAS;
-use mapper_physics::rig::sensor_fault::{Rest, additive};
+use mapper_physics::rig::sensor_fault::{ExactReadings, additive};
 
 /// Prior probability of a fault. Judgement: one recording in ten has one; docs/validation/faults.md uses the same value.
 const EXPECTED_FAULTS: f64 = 0.1;
@@ -155,7 +155,7 @@ pub(crate) fn suspect(index: usize) -> Suspect {
 pub(crate) fn all_readings(
     recording: &Recording,
     ends: &[Option<Ends>],
-    rest: Rest,
+    rest: ExactReadings,
 ) -> Option<Vec<Option<Readings>>> {
     let (first_s, last_s) = span_s(recording)?;
     let every = ends.len().div_ceil(MAX_CORRELATED_ROWS).max(1);

@@ -21,7 +21,7 @@ use mapper_core::{Channel, DeclaredUncertainty, Recording, SAMPLE_INTERVAL_S};
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
 use mapper_observe::declared::{CommonOffset, rest, usual_noise_sigma};
-use mapper_physics::rig::sensor_fault::Rest;
+use mapper_physics::rig::sensor_fault::ExactReadings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -311,7 +311,7 @@ impl SoakReadings<'_> {
         let third_s = (end_s - start_s) / SOAK_PARTS;
         let of_third = sigma_of_mean(noise_sigma, third_s, self.config);
         let drift_sigma = std::f64::consts::SQRT_2 * of_third / (2.0 * third_s / S_PER_MIN);
-        let gain_sigma = declared.gain_sigma_ratio * Rest::default().gain_error(channel, mean);
+        let gain_sigma = declared.gain_sigma_ratio * ExactReadings::default().gain_error(channel, mean);
         let total = own.hypot(declared.offset_sigma).hypot(gain_sigma);
         let drift_per_min = reading.drift_per_min;
         Some(Ok(Reading { channel, mean, own, total, drift_per_min, drift_sigma }))

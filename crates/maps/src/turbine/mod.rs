@@ -2,5 +2,4 @@
 
 pub(crate) mod turbine_compare;
 pub(crate) mod turbine_fit;
-pub(crate) mod turbine_points;
 pub(crate) mod turbine_surface;

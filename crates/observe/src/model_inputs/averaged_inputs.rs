@@ -3,9 +3,7 @@
 //! In contrast to [`smoothed_inputs`](crate::model_inputs::smoothed_inputs), these keep the noise of means, which is independent between
 //! segments, and follow a step of an input sensor. The search for drift needs both properties.
 
-use crate::averages::mean_reading::BEFORE_S;
-use crate::averages::schedule::Schedule;
-use crate::averages::time_table::Table;
+use crate::averages::{BEFORE_S, Schedule, Table};
 use crate::channels::{INPUT_CHANNELS, boundary_condition};
 use crate::model_inputs::lagged_command::{
     LaggedCommand, Response, commanded_s, levels_of_step, measured_valve_response,

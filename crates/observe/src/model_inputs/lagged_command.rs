@@ -1,7 +1,6 @@
 //! Response of P3 and the valve to their commands: a dead time, a first-order lag, a rate limit and play, and their estimation from a recording.
 
-use crate::averages::schedule::TIME_ROUNDING_S;
-use crate::averages::time_table::Table;
+use crate::averages::{TIME_ROUNDING_S, Table};
 use mapper_core::{Channel, Recording, Series, StepMarker, is_jump, is_same_command};
 use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{mean, median};

@@ -4,7 +4,7 @@
 //! quantities may jump with P3 (P4 does, because of the flow; the remainder, by the gain error of the transducer): regression gives that
 //! share, and the remainder is smooth. Jumps are not smoothed.
 
-use crate::averages::time_table::Table;
+use crate::averages::Table;
 use crate::channels::{INPUT_CHANNELS, boundary_condition};
 use crate::declared::Declared;
 use crate::model_inputs::lagged_command::{LaggedCommand, Response, commanded_s, levels_of_step};

@@ -4,8 +4,7 @@
 //! The recorded command gives the time to within one sample. The remaining error shows in the measured P3, which changes by tens of kPa a
 //! second after a jump. An equal delay of all jumps belongs to the actuator and stays in its response; different delays belong to the run.
 
-use crate::averages::schedule::TIME_ROUNDING_S;
-use crate::averages::time_table::Table;
+use crate::averages::{TIME_ROUNDING_S, Table};
 use crate::model_inputs::lagged_command::{LaggedCommand, Level, Response, levels_of_step};
 use mapper_core::{Channel, Recording, StepMarker, is_same_command};
 use mapper_numerics::minimise::minimise;

@@ -4,7 +4,7 @@
 //! it. Probes of different diameters are fused without a correction of their lags, which would multiply their noise: to first order the lag
 //! of their mean is the mean of their lags, which is sufficient for slow changes.
 
-use crate::averages::time_table::resample;
+use crate::averages::resample;
 use crate::redundant_sensors::element_fault::{Contradiction, FaultyElement, FusedChannel};
 use crate::redundant_sensors::element_judge::{FALSE_ALARMS_RATIO, Judgement, comparisons, judge};
 use mapper_core::{

@@ -194,20 +194,20 @@ pub fn additive() -> impl Iterator<Item = &'static SensorFault> {
 
 /// Readings at which gain errors vanish: those of an isothermal zero; without one, no pressure and 20 degC.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Rest {
+pub struct ExactReadings {
     /// Of P1 and P2, Pa.
     pub pressure_pa: f64,
     /// Of the thermometers, K.
     pub temperature_k: f64,
 }
 
-impl Default for Rest {
+impl Default for ExactReadings {
     fn default() -> Self {
-        Rest { pressure_pa: 0.0, temperature_k: CALIBRATED_AT_K }
+        ExactReadings { pressure_pa: 0.0, temperature_k: CALIBRATED_AT_K }
     }
 }
 
-impl Rest {
+impl ExactReadings {
     /// Error of a reading for a gain error of 1.
     pub fn gain_error(&self, channel: Channel, reading: f64) -> f64 {
         match channel {
@@ -265,7 +265,7 @@ impl SensorFault {
         reading: f64,
         housing_k: f64,
         run_ratio: f64,
-        rest: Rest,
+        rest: ExactReadings,
     ) -> f64 {
         if !self.channels.contains(&channel) {
             return 0.0;

@@ -4,7 +4,6 @@ pub mod driven;
 pub mod inputs;
 pub mod linearised_run;
 pub mod model;
-pub mod outputs;
 pub mod rosenbrock;
 pub mod simulate;
 pub mod steady;

@@ -1,7 +1,6 @@
-//! Names and version of the recording format; topics of a recording, their messages and JSON schemas, for the file and for clients that
-//! receive the same data live.
+//! Names and version of the recording format; topics of a recording, their messages and JSON schemas.
 
-use mapper_core::{Channel, ChannelInfo, Event, Group, StepMarker, step_number};
+use mapper_core::{ChannelInfo, Event, StepMarker, step_number};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
@@ -56,7 +55,7 @@ pub enum StepPhase {
 
 /// A topic as the recording defines it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Topic {
+pub(crate) struct Topic {
     /// E.g. `/rig/compressor`.
     pub name: &'static str,
     /// JSON schema of its messages, with unit, title and description of each field.
@@ -66,15 +65,6 @@ pub struct Topic {
 }
 
 impl Topic {
-    /// Readings of a device, of these of its channels.
-    pub fn of_group(group: Group, channels: impl IntoIterator<Item = Channel>) -> Topic {
-        let mut channels: Vec<Channel> =
-            channels.into_iter().filter(|channel| channel.info().group == group).collect();
-        channels.sort();
-        let fields: Vec<Field<'_>> = channels.into_iter().map(|of| Field::of_channel(of.info())).collect();
-        Topic::of_fields(group.topic(), &fields)
-    }
-
     /// Numbers with their units.
     pub(crate) fn of_fields(name: &'static str, fields: &[Field<'_>]) -> Topic {
         let units = fields.iter().map(|field| (field.name.to_owned(), field.unit.to_owned())).collect();
@@ -82,13 +72,13 @@ impl Topic {
     }
 
     /// Starts and ends of steps.
-    pub fn of_steps() -> Topic {
+    pub(crate) fn of_steps() -> Topic {
         let (schema, units) = step_schema();
         Topic { name: STEP_TOPIC, schema, units }
     }
 
     /// Messages of the rig and the runner.
-    pub fn of_events() -> Topic {
+    pub(crate) fn of_events() -> Topic {
         let (schema, units) = event_schema();
         Topic { name: EVENT_TOPIC, schema, units }
     }
@@ -101,7 +91,7 @@ impl Topic {
 }
 
 /// Run time, s, and message of a step's start or end.
-pub fn step_message(step: &StepMarker, phase: StepPhase) -> (f64, Value) {
+pub(crate) fn step_message(step: &StepMarker, phase: StepPhase) -> (f64, Value) {
     let (t_s, phase) = match phase {
         StepPhase::Start => (step.start_s, "start"),
         StepPhase::End => (step.end_s, "end"),
@@ -115,16 +105,8 @@ pub fn step_message(step: &StepMarker, phase: StepPhase) -> (f64, Value) {
 }
 
 /// Message of an event.
-pub fn event_message(event: &Event) -> Value {
+pub(crate) fn event_message(event: &Event) -> Value {
     json!({"t_s": event.t_s, "kind": event.kind, "message": event.message})
-}
-
-/// Message of a device's readings, SI; null if a value is not a number.
-pub fn readings_message(group: Group, values: &[(Channel, f64)]) -> Value {
-    let of_group = values.iter().filter(|(channel, _)| channel.info().group == group);
-    let fields: Map<String, Value> =
-        of_group.map(|(channel, value)| (channel.info().field.to_owned(), json!(value))).collect();
-    Value::Object(fields)
 }
 
 /// One numeric field of a topic.

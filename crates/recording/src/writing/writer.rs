@@ -400,8 +400,10 @@ fn push_number(line: &mut Vec<u8>, value: f64) {
     }
 }
 
-#[cfg(all(test, target_os = "linux"))]
+#[cfg(test)]
 mod tests {
+    #![cfg(target_os = "linux")]
+
     use super::*;
 
     /// Linux has a device that is always full.

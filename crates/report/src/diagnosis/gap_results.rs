@@ -1,51 +1,11 @@
-//! What follows from a diagnosed gap: recordings compared, a prediction checked, a map corrected.
+//! What follows from a diagnosed gap: a prediction checked, a map without its causes.
 
 use crate::diagnosis::gap_next::next_section;
 use crate::diagnosis::gap_text::{cause, headline};
 use crate::document::{Document, Table};
 use crate::formatting::{display_scale, four_figures, with_margins};
-use mapper_core::{Margins, with_unit};
-use mapper_diagnose::gap::{
-    CorrectedMap, Diagnosis, ForecastCheck, NotCorrected, Over, Persistence, PointCorrection, Value,
-};
-
-/// Each recording's headline, then each cause over all of them.
-pub fn compared_recordings(headlines: &[(String, String)], over: &[Over]) -> Document {
-    let mut document = Document::default();
-    document.numbered(headlines.iter().map(|(path, headline)| format!("{path}: {headline}")));
-    if over.is_empty() {
-        document.text("no cause to compare: none is named, or the recordings have other channels");
-    }
-    let mut body = Document::default();
-    for cause in over {
-        let persistence = match cause.persistence {
-            Persistence::Persists => "persists",
-            Persistence::Changes => "is in every recording, and changes",
-            Persistence::Appeared => "appeared",
-            Persistence::Disappeared => "disappeared",
-            Persistence::ComesAndGoes => "comes and goes",
-        };
-        let caption = format!("{} ({}) {persistence}: {}", cause.name, cause.effect, cause.size);
-        let mut table = Table::new(["recording", "size", ""]).caption(caption).all_texts();
-        for (number, (value, present)) in cause.each.iter().zip(&cause.present).enumerate() {
-            let absent = if *present { "" } else { "indistinguishable from zero" };
-            table.row([(number + 1).to_string(), interval(value, &cause.unit), absent.to_owned()]);
-        }
-        table.row(["together".to_owned(), interval(&cause.together, &cause.unit), String::new()]);
-        body.table(table);
-    }
-    document.section("Causes over the recordings", body);
-    document
-}
-
-fn interval(value: &Value, unit: &str) -> String {
-    format!(
-        "{} ({} .. {})",
-        with_unit(four_figures(value.value), unit),
-        four_figures(value.low),
-        four_figures(value.high)
-    )
-}
+use mapper_core::Margins;
+use mapper_diagnose::gap::{CorrectedMap, Diagnosis, ForecastCheck, NotCorrected, PointCorrection};
 
 /// The residual of each channel. `seal`: the hash of the prediction.
 pub fn forecast_check(check: &ForecastCheck, seal: &str) -> Document {

@@ -9,23 +9,7 @@ use mapper_core::{IdentifiedPoint, Plan};
 use mapper_maps::assemble;
 use maud::{Markup, html};
 use serde::Serialize;
-
-/// Initial data of the script.
-#[derive(Serialize)]
-struct Empty {
-    units: EmptyUnits,
-    points: [(); 0],
-    map: DrawnMap,
-    others: [(); 0],
-    lines: [(); 0],
-    planned: [(); 0],
-}
-
-#[derive(Serialize)]
-struct EmptyUnits {
-    flow: &'static str,
-    speed: &'static str,
-}
+use serde_json::json;
 
 /// A point in the form of the page's script.
 #[derive(Debug, Clone, Serialize)]
@@ -49,14 +33,10 @@ pub struct Planned {
 /// # Errors
 /// None in practice: JSON of numbers and strings can always be written.
 pub fn live_page() -> Result<String, serde_json::Error> {
-    let empty = Empty {
-        units: EmptyUnits { flow: "", speed: "" },
-        points: [],
-        map: DrawnMap::default(),
-        others: [],
-        lines: [],
-        planned: [],
-    };
+    let empty = json!({
+        "units": {"flow": "", "speed": ""}, "map": DrawnMap::default(),
+        "points": [], "others": [], "lines": [], "planned": [],
+    });
     shell("A run of mapper, live", "A run of mapper, live", Purpose::Live, &empty, &live())
 }
 

@@ -3,5 +3,4 @@
 pub(crate) mod campaign_check;
 pub(crate) mod commissioning;
 pub(crate) mod plan_document;
-pub(crate) mod plan_picture;
 pub(crate) mod plan_remark_text;

@@ -3,9 +3,9 @@
 use crate::document::{Sentence, number, sentence, signed};
 use crate::formatting::{Message, four_figures};
 use mapper_core::{
-    Bound, CalibrationDefect, Channel, Dimension, EndEvidence, EtaSignal, FitFailure, HeatCorrected,
-    Implausible, LeftOut, MapRegion, ModelDoubt, ModelEvidence, NoCompression, PoorFit, Scaled, StepConflict,
-    SuspectedFault, Swapped, TooFew, Warning, WideInterval, with_unit,
+    Bound, CalibrationDefect, Channel, Dimension, EndEvidence, EtaSignal, FitFailure, Implausible, LeftOut,
+    MapRegion, ModelDoubt, ModelEvidence, NoCompression, PoorFit, Scaled, StepConflict, SuspectedFault,
+    Swapped, TooFew, Warning, WideInterval, with_unit,
 };
 
 impl Message for Warning {
@@ -56,14 +56,6 @@ fn fit_sentence(warning: &Warning) -> Option<Sentence> {
         Warning::NothingDeclared => {
             sentence!("no sensor uncertainty is declared: the interval contains only noise")
         }
-        Warning::HeatCorrected(HeatCorrected::Corrected { apparent_eta }) => sentence!(
-            "corrected from an apparent {} % by one heat for the whole map; the interval assumes it known to half its size",
-            number(100.0 * apparent_eta, 2)
-        ),
-        Warning::HeatCorrected(HeatCorrected::TooMuchHeat { heat_w }) => sentence!(
-            "without a heat of {} W its efficiency would be above 95 %: it did not take up that much",
-            number(*heat_w, 0)
-        ),
         Warning::LeftOut(reason) => describe_left_out(reason),
         Warning::OffTheLaw { h_deviation_ratio } => sentence!(
             "h lies {} % off the law that the other points follow",

@@ -9,9 +9,7 @@ use mapper_core::{
     MapDescription, MapFormat, MapPoint, ReferenceState, TurbineMap, Verdict,
 };
 use mapper_maps::table::{description_text, turbine_description_text};
-use mapper_maps::{
-    MapFitOptions, compare, compare_turbines, convert_efficiency, correct_for_heat, fit_map, fit_turbine,
-};
+use mapper_maps::{MapFitOptions, compare, compare_turbines, convert_efficiency, fit_map, fit_turbine};
 use mapper_report::{
     Describe, Document, Message, distinct_names, map_comparison_figure, map_fit, turbine_fit,
 };
@@ -249,31 +247,6 @@ impl Registry {
                 Ok(MapWork { document, json, warnings: warnings(path, &imported.remarks) })
             }
         }
-    }
-
-    /// Removes the heat transfer from a map measured hot, and writes it to `out`. `heat_w` is the heat flow, W; it is estimated from the map if
-    /// `None`.
-    ///
-    /// # Errors
-    /// As [`Registry::read_map`], [`MapWorkError::NotCorrected`], and those of writing.
-    pub fn correct_map_file(
-        &self,
-        path: &Path,
-        user_description: &MapDescription,
-        heat_w: Option<f64>,
-        out: Option<MapOut<'_>>,
-    ) -> Result<MapWork, SessionError> {
-        let format = out.map(|out| out.format(self)).transpose()?;
-        let imported = self.inspect_map(path, user_description)?;
-        let (map, correction) = correct_for_heat(imported.map, heat_w)
-            .map_err(|source| MapWorkError::NotCorrected(path.to_owned(), source))?;
-        let mut document = correction.document();
-        if let Some((out, format)) = out.zip(format) {
-            write_map_fitted_if_needed(out.path, format, map, out.existing)?;
-            document.facts("", [("map", out.path.display().to_string())]);
-        }
-        let json = json!({"map": path, "correction": correction, "file": out.map(|out| out.path)});
-        Ok(MapWork { document, json, warnings: warnings(path, &imported.remarks) })
     }
 
     /// Compares two maps of the same machine. `picture` is a new file that shows both.

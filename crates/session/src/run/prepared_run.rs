@@ -494,7 +494,7 @@ impl PreparedRun<'_> {
             library: PROGRAM.to_owned(),
             profile: String::new(),
             // Simulated time starts at 0, so that equal seeds give equal bytes.
-            start_time_ns: crate::start_time_ns(&self.rig(), self.request.started_ns),
+            start_time_ns: start_time_ns(&self.rig(), self.request.started_ns),
             metadata: metadata(self.request.campaign, &self.plan),
             plan_json: Some(plan_json.into_bytes()),
             campaign_yaml: Some(self.request.campaign_text.as_bytes().to_vec()),
@@ -548,6 +548,6 @@ pub(crate) fn metadata(campaign: &Campaign, plan: &Plan) -> BTreeMap<String, Str
 }
 
 /// Epoch time of run time 0, ns, for a run started at `started_ns`; 0 for simulated time, so that equal runs give equal bytes.
-pub fn start_time_ns(rig: &RigDescription, started_ns: u64) -> u64 {
+fn start_time_ns(rig: &RigDescription, started_ns: u64) -> u64 {
     if rig.simulated_time { 0 } else { started_ns }
 }

@@ -10,7 +10,6 @@ use mapper_diagnose::gap::{
     Calibration, ClosureSearch, Diagnosed, EffectVisibility, GapRequest, Origin, RigRecording, Scores,
     Verdict,
 };
-use mapper_fleet::Engine;
 use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{NORMAL_975, quantile};
 use mapper_observe::Declared;
@@ -35,14 +34,11 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The command line of this calibration.
-    pub fn command(&self, campaign: &Path) -> String {
+    /// The study of this calibration.
+    pub fn study(&self, campaign: &Path) -> String {
+        let (campaign, Plan { seed, nulls, others }) = (campaign.display(), self);
         format!(
-            "mapper gap blind calibrate --campaign {} --seed {} --nulls {} --cases {}",
-            campaign.display(),
-            self.seed,
-            self.nulls,
-            self.others
+            "mapper fleet run, study: {{study: calibration, campaign: {campaign}, seed: {seed}, nulls: {nulls}, cases: {others}}}"
         )
     }
 }
@@ -81,28 +77,6 @@ impl DiagnosisSummary {
     }
 }
 
-/// Draws the cases, diagnoses them, several at a time, and fits the constants; `None` if the operator stopped the run.
-///
-/// # Errors
-/// [`BlindError`] if a case cannot be run; a recording that cannot be diagnosed is omitted.
-pub fn calibrate(
-    campaign: &Campaign,
-    catalogue: &[Arc<dyn Effect>],
-    plan: &Plan,
-    made_by: String,
-    engine: &Engine<'_>,
-) -> Result<Option<(Calibration, Vec<DiagnosisSummary>)>, BlindError> {
-    // Drawing takes some seconds: show progress from the start.
-    (engine.on_progress)(0, plan.nulls + plan.others);
-    let cases = cases(campaign, catalogue, plan)?;
-    let diagnosis = CalibrationSettings::new(campaign, catalogue)?;
-    let observed = engine.each(&cases, |_, case| diagnosis.observe(case))?;
-    // Cases that were not started mean a stop by the operator; cases that could not be diagnosed are omitted.
-    let Some(observed) = observed.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
-    let observed: Vec<DiagnosisSummary> = observed.into_iter().flatten().collect();
-    Ok(Some((fit(&shipped()?, &observed, made_by), observed)))
-}
-
 pub(crate) fn shipped() -> Result<Calibration, BlindError> {
     Calibration::shipped().map_err(BlindError::signatures)
 }
@@ -120,7 +94,7 @@ pub fn cases(
     let schedule = Schedule::new(campaign, &nominal)?;
     let mut known = catalogue.to_vec();
     known.extend(outside_kinds(OutsideUse::Calibration));
-    let meter = visibility_on(campaign, &schedule, &nominal, known, plan.seed)?;
+    let meter = visibility(campaign, &schedule, &nominal, known, plan.seed)?;
     let draw = |cases, kinds, seed| Draw { kinds, ..Draw::new(seed, cases, OutsideUse::Calibration) };
     let others = vec![CaseKind::Single, CaseKind::Pair, CaseKind::Outside];
     let mut cases = draw(plan.others, others, plan.seed).cases(catalogue, &meter);
@@ -449,21 +423,6 @@ fn argument(weights: &[f64; 3], features: &[f64; 2]) -> f64 {
     x.clamp(-500.0, 500.0)
 }
 
-/// The visibility of `effects` on a recording of the campaign with noise, offsets, tolerances and weather but without a cause. Equal seeds give
-/// equal recordings.
-///
-/// # Errors
-/// [`BlindError`] if the campaign has no nominal model or cannot be run.
-pub fn visibility(
-    campaign: &Campaign,
-    effects: Vec<Arc<dyn Effect>>,
-    seed: u64,
-) -> Result<EffectVisibility, BlindError> {
-    let nominal = nominal_model(campaign)?;
-    let schedule = Schedule::new(campaign, &nominal)?;
-    visibility_on(campaign, &schedule, &nominal, effects, seed)
-}
-
 /// The uncertainties and tolerances that the campaign declares: those from which the lab of a case draws.
 pub(crate) fn declared(campaign: &Campaign) -> Declared {
     Declared {
@@ -476,8 +435,9 @@ pub(crate) fn declared(campaign: &Campaign) -> Declared {
     }
 }
 
-/// [`visibility`] on a schedule of the campaign. Other weather changes the signatures by a few per cent.
-pub(crate) fn visibility_on(
+/// The visibility of `effects` on a recording of a schedule with noise, offsets, tolerances and weather but without a cause. Equal seeds give
+/// equal recordings; other weather changes the signatures by a few per cent.
+pub(crate) fn visibility(
     campaign: &Campaign,
     schedule: &Schedule<'_>,
     nominal: &Model,

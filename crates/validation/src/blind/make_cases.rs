@@ -1,6 +1,6 @@
 //! Makes a directory of cases: recordings, and sealed answers whose hash is printed before the diagnosis.
 
-use crate::blind::calibration::visibility_on;
+use crate::blind::calibration::visibility;
 use crate::blind::cases::{BlindError, Case, Draw, Laboratory, Truth};
 use crate::blind::outside::outside_kinds;
 use crate::blind::virtual_runs::Schedule;
@@ -68,7 +68,7 @@ pub fn draw_cases(
     let schedule = Schedule::new(campaign, &nominal)?;
     let mut known = catalogue.to_vec();
     known.extend(outside_kinds(draw.outside));
-    let meter = visibility_on(campaign, &schedule, &nominal, known, draw.seed)?;
+    let meter = visibility(campaign, &schedule, &nominal, known, draw.seed)?;
     Ok(draw.cases(catalogue, &meter))
 }
 

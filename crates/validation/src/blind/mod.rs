@@ -15,7 +15,6 @@ pub use crate::blind::cases::{
     Case, CaseKind, Cause, Draw, Laboratory, SIGMA_RANGE, SignatureMeter, StoredCase, Truth, TruthPoint,
 };
 pub use crate::blind::make_cases::{ANSWERS_NAME, MANIFEST_NAME, Manifest};
-pub use calibration::visibility;
 pub use cases::BlindError;
 pub use make_cases::{CreatedCases, draw_cases, make, record, seal};
 pub use outside::{OutsideUse, outside_kinds};

@@ -1,7 +1,7 @@
 //! Reliability of the probabilities: an answer given with probability p should be right in a share p of the cases. Shares have their exact
 //! intervals.
 
-use crate::blind::calibration::{DiagnosisSummary, fit, shipped, undetermined, weights};
+use crate::blind::calibration::{DiagnosisSummary, fit, shipped, weights};
 use crate::blind::cases::{BlindError, CaseKind};
 use mapper_diagnose::gap::Calibration;
 use mapper_numerics::statistics::share_interval_95;
@@ -9,7 +9,6 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt;
 use std::fmt::Write;
-use std::path::Path;
 
 /// `hits` out of `trials`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -205,17 +204,6 @@ fn shipped_and_cross_validated(before: &Calibration, observed: &[DiagnosisSummar
         reliability("that ships", observed, &shipped),
         reliability("fitted to the other cases", observed, &held_out),
     ]
-}
-
-/// The result of a calibration as text, with its file and the numbers that the data do not determine.
-pub fn calibrated_text(
-    diagnoses: usize,
-    file: &Path,
-    calibration: &Calibration,
-    reliabilities: &[Reliability],
-) -> String {
-    let (reliability, undetermined) = (reliability_text(reliabilities), undetermined(calibration).join("\n"));
-    format!("calibration from {diagnoses} diagnoses in {}\n{undetermined}\n{reliability}", file.display())
 }
 
 /// One sentence for each result.

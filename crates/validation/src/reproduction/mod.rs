@@ -5,13 +5,14 @@
 mod figure_data;
 mod figures;
 mod lab;
+#[cfg(test)]
+#[path = "../../tests/inside/model_table.rs"]
 mod model_table;
-mod page;
 mod picture;
 
 pub use crate::reproduction::figure_data::ReproduceError;
 pub use figure_data::{FigureResult, Statement, Table, Verdict, picture_path};
-pub use page::{figure_json, reproduction_page};
+pub use picture::{figure_json, reproduction_page};
 
 /// Numbers of the reproduced figures, in order.
 pub const FIGURES: [&str; 8] = ["5", "6", "7", "8", "9", "10", "11", "12"];

@@ -1,4 +1,4 @@
-//! `study: calibration`: the cases that `mapper gap blind calibrate` draws to convert scores into probabilities.
+//! `study: calibration`: cases from which the diagnosis learns to convert scores into probabilities.
 
 use crate::blind::calibration::{CalibrationSettings, DiagnosisSummary, Plan, cases, fitted, undetermined};
 use crate::blind::reliability::{Bin, Reliability, reliabilities, reliability_text};
@@ -72,7 +72,7 @@ impl Kind for Calibration<'_> {
             payload: json!(CalibrationItem { campaign: campaign.clone(), case: StoredCase::from(case) }),
         };
         let items = drawn.iter().enumerate().map(item).collect();
-        let settings = json!({ "made_by": plan.command(&path) });
+        let settings = json!({ "made_by": plan.study(&path) });
         Ok(StudyDraft { items, settings })
     }
 

@@ -6,7 +6,7 @@ use mapper_core::Method;
 use mapper_fleet::{
     FleetError, ItemDraft, Kind, Output, Results, StudyDraft, StudyFile, WorkContext, WorkError,
 };
-use mapper_session::{ErrorKind, NightlyRun, Registry, Session, SessionError, nominal_model};
+use mapper_session::{ErrorKind, NightlyRun, Registry, Session, nominal_model};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -80,7 +80,7 @@ impl Kind for Maps<'_> {
         let model = nominal_model(&campaign)?;
         let name = campaign.name.clone();
         let method = campaign.identification.method;
-        let run = NightlyRun::new(campaign, model, method, seed, None).map_err(SessionError::from)?;
+        let run = NightlyRun::new(campaign, model, method, seed, None);
         let session = Session { stop: at.stop, ..Session::new(self.0) };
         let points = run.points(&session, at.scratch, &methods).map_err(|error| match error.kind() {
             ErrorKind::Interrupted => WorkError::Interrupted,

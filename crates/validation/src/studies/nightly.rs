@@ -8,7 +8,7 @@ use mapper_fleet::{
 };
 use mapper_history::RunRow;
 use mapper_session::{
-    ErrorKind, NightlyRun, PreparedNight, Registry, Session, SessionError, Variant, json_text, nominal_model,
+    DrawnMachine, ErrorKind, NightlyRun, PreparedNight, Registry, Session, json_text, nominal_model,
     program_and_commit,
 };
 use schemars::JsonSchema;
@@ -46,7 +46,7 @@ struct NightlyItem {
     method: Method,
     seed: u64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    machine: Option<Variant>,
+    machine: Option<DrawnMachine>,
 }
 
 /// File of the rows.
@@ -84,8 +84,7 @@ impl Kind for Nightly<'_> {
         let item = NightlyItem::deserialize(payload)?;
         let campaign = item.campaign.campaign()?;
         let model = nominal_model(&campaign)?;
-        let run = NightlyRun::new(campaign, model, item.method, item.seed, item.machine)
-            .map_err(SessionError::from)?;
+        let run = NightlyRun::new(campaign, model, item.method, item.seed, item.machine);
         let session = Session { stop: at.stop, ..Session::new(self.0) };
         let row = session.nightly_run(&run, &at.scratch.join("run")).map_err(|error| match error.kind() {
             ErrorKind::Interrupted => WorkError::Interrupted,

@@ -109,8 +109,10 @@ pub fn open(
     }))
 }
 
-#[cfg(all(test, target_os = "linux"))]
+#[cfg(test)]
 mod tests {
+    #![cfg(target_os = "linux")]
+
     use super::*;
     use std::path::PathBuf;
 

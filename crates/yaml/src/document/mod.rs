@@ -2,4 +2,3 @@
 
 pub(crate) mod file;
 pub(crate) mod positions;
-pub(crate) mod tree;

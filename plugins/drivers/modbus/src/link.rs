@@ -235,8 +235,9 @@ async fn in_time<T>(within: Duration, work: impl Future<Output = T>) -> Option<T
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::*;
 
     /// A controller that accepts connections and stays silent, at the maximum timeout: the writes of the safe state

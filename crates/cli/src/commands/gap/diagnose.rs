@@ -6,10 +6,10 @@ use crate::output::failure::{Code, Failure};
 use crate::output::standard_output::Replace;
 use crate::output::{output_options, standard_output};
 use clap::Args;
-use mapper_diagnose::gap::{Calibration, ClosureTerm, Diagnosed, Over};
-use mapper_report::{Describe, Document, compared_recordings, headline, with_messages};
+use mapper_diagnose::gap::ClosureTerm;
+use mapper_report::{Describe, Document, headline, with_messages};
 use mapper_session::{
-    DIAGNOSIS_FORMAT, Gap, Recorded, Session, SessionError, SessionEvent, check_all_distinct,
+    DIAGNOSIS_FORMAT, Gap, Recorded, Session, SessionEvent, check_all_distinct,
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ use std::path::PathBuf;
 pub struct Diagnose {
     /// Campaign with machine, declared uncertainties and tolerances (YAML)
     pub campaign: PathBuf,
-    /// Run directory, MCAP file, or log of another program; several, in chronological order, are diagnosed separately and compared
+    /// Run directory, MCAP file, or log of another program; several are diagnosed separately
     #[arg(value_name = "RECORDING", required_unless_present = "named")]
     pub recordings: Vec<PathBuf>,
     /// The same, by name
@@ -48,7 +48,7 @@ pub struct Diagnose {
 }
 
 impl Diagnose {
-    /// Diagnoses one recording, or several and compares their causes.
+    /// Diagnoses one recording, or each of several.
     pub fn run(&self) -> Result<(), Failure> {
         self.html.iter().try_for_each(|file| self.replace.existing().check(file))?;
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
@@ -91,8 +91,6 @@ impl Diagnose {
                 standard_output::show(&document(gap))
             };
         }
-        let diagnosed: Vec<&Diagnosed> = gaps.iter().map(|(_, gap)| &gap.diagnosed).collect();
-        let over = Over::recordings(&diagnosed, &Calibration::shipped().map_err(SessionError::Calibration)?);
         if self.json {
             let each: Result<Vec<Value>, Failure> = gaps
                 .iter()
@@ -102,13 +100,13 @@ impl Diagnose {
                     Ok(value)
                 })
                 .collect();
-            return standard_output::print_json(&json!({
-                "format_version": DIAGNOSIS_FORMAT, "recordings": each?, "causes": over,
-            }));
+            let each = json!({ "format_version": DIAGNOSIS_FORMAT, "recordings": each? });
+            return standard_output::print_json(&each);
         }
-        let heads: Vec<(String, String)> =
-            gaps.iter().map(|(path, gap)| (path.clone(), headline(&gap.diagnosed.diagnosis))).collect();
-        standard_output::show(&compared_recordings(&heads, &over))
+        let mut document = Document::default();
+        let head = |(path, gap): &(String, Gap)| format!("{path}: {}", headline(&gap.diagnosed.diagnosis));
+        document.list(gaps.iter().map(head));
+        standard_output::show(&document)
     }
 
     /// Writes the closure terms that can be written into `directory`; next to the page if only that was asked for.

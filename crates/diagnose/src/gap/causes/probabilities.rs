@@ -4,10 +4,9 @@ use crate::gap::best_fit::adequacy::Adequacy;
 use crate::gap::best_fit::coordinate::{Coordinate, infos};
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::causes::calibration::Calibration;
-use crate::gap::findings::in_words;
-use crate::gap::findings::report::{Candidate, Estimate, MAX_EQUIVALENT, Onset};
+use crate::gap::findings::report::{Candidate, Estimate, MAX_EQUIVALENT, Onset, size_in_words};
 use crate::gap::next_experiment::best_experiment::{Rivals, SETTLED};
-use crate::gap::residuals::hypothesis::onset_step;
+use crate::gap::residuals::nuisance::onset_step;
 use crate::gap::residuals::study::{EffectValues, Hypothesis, Study, members};
 use mapper_core::half_width_95;
 use mapper_inference::posterior::{CauseProbabilities, CauseSet, RankedCause};
@@ -159,7 +158,7 @@ pub(crate) fn estimates(
             high: a.max(b),
             unit: parameter.unit.to_string(),
             neutral: parameter.neutral,
-            size: in_words::size(parameter, value),
+            size: size_in_words(parameter, value),
         };
         (name_of(info, parameter), estimate)
     };

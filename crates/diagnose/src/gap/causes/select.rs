@@ -6,7 +6,7 @@ use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::additions::{Addition, additions};
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::probabilities::{prior, weight};
-use crate::gap::residuals::hypothesis::onset_step;
+use crate::gap::residuals::nuisance::onset_step;
 use crate::gap::residuals::study::{PredictError, Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::half_width_95;

@@ -4,8 +4,8 @@ use crate::gap::best_fit::coordinate::{Coordinate, typical};
 use crate::gap::best_fit::normal::{PRIOR_STEPS, Projector, Selection};
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::probabilities::prior_of_number;
-use crate::gap::findings::in_words;
 use crate::gap::findings::report::SmallestSeen;
+use crate::gap::findings::report::size_in_words;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::Linearised;
 use mapper_numerics::least_squares::descent::Until;
@@ -96,7 +96,7 @@ impl SmallestSeen {
             parameter: parameter.name.to_string(),
             value,
             unit: parameter.unit.to_string(),
-            size: value.map(|value| in_words::size(parameter, value)),
+            size: value.map(|value| size_in_words(parameter, value)),
         }
     }
 }

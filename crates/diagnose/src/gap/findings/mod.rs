@@ -1,6 +1,5 @@
 //! The diagnosis report for programs, recommended experiments, and effect sizes in engineering terms.
 
 pub(crate) mod experiment;
-pub(crate) mod in_words;
 pub(crate) mod report;
 pub(crate) mod warning;

@@ -1,5 +1,4 @@
 //! Choice of the next experiment or sensor, by the expected separation of the remaining candidate effects.
 
 pub(crate) mod best_experiment;
-pub(crate) mod odds;
 pub(crate) mod outlook;

@@ -11,7 +11,7 @@ use crate::gap::residuals::whiten::Linearised;
 use mapper_core::{Channel, OperatingPoint, Recording, SAMPLE_INTERVAL_S, Series, StepKind, StepMarker};
 use mapper_identify::BLOCK_S;
 use mapper_numerics::least_squares::descent::FINE;
-use mapper_observe::averages::time_table::Table;
+use mapper_observe::averages::Table;
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::UNINFORMATIVE;
 use mapper_physics::machine::params::BoundaryConditions;

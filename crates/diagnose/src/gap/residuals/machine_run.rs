@@ -1,7 +1,7 @@
 //! A run of the machine, which hypotheses share if they differ only in the sensors of outputs.
 
 use crate::gap::best_fit::coordinate::typical;
-use crate::gap::residuals::hypothesis::Hypothesis;
+use crate::gap::residuals::nuisance::Hypothesis;
 use crate::gap::residuals::nuisance::{NuisanceKind, OUTPUTS};
 use mapper_core::Channel;
 use mapper_observe::channels::INPUT_CHANNELS;

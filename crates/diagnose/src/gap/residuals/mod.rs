@@ -1,6 +1,5 @@
 //! Whitened residuals of a recording under any hypothesis of nuisances and effects, as input of the gap diagnosis.
 
-pub(crate) mod hypothesis;
 pub(crate) mod machine_run;
 pub(crate) mod nuisance;
 pub(crate) mod point_state;

@@ -1,15 +1,15 @@
 //! Runs of the model through the recording, and the readings that they predict.
 
 use crate::gap::model_error::structure::repeating_part;
-use crate::gap::residuals::hypothesis::Hypothesis;
 use crate::gap::residuals::machine_run::{
     LinearisedMachine, LinearisedSamples, MachineRun, Sample, SampleValues,
 };
+use crate::gap::residuals::nuisance::Hypothesis;
 use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS, RESPONSES_S};
 use crate::gap::residuals::study::{PredictError, Prediction, Study};
 use crate::gap::residuals::true_inputs::with_metal_held;
 use mapper_core::Channel;
-use mapper_observe::averages::mean_reading::mean_reading;
+use mapper_observe::averages::mean_reading;
 use mapper_observe::initial_state::estimate_state;
 use mapper_observe::model_inputs::lagged_command::{LaggedCommand, Response};
 use mapper_physics::rig::effect::{EffectError, Rig};

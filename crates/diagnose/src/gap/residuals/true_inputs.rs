@@ -4,8 +4,7 @@ use crate::gap::residuals::nuisance::Circumstances;
 use mapper_core::{Channel, Recording};
 use mapper_numerics::ROUNDING;
 use mapper_numerics::least_squares::descent::ROUNDS;
-use mapper_observe::averages::mean_reading::mean_reading;
-use mapper_observe::averages::time_table::Table;
+use mapper_observe::averages::{Table, mean_reading};
 use mapper_observe::channels::{INPUT_CHANNELS, boundary_condition};
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::lagged_command::{

@@ -17,7 +17,7 @@ use crate::inside::gap::common::{Visits, declared, effects, request};
 use mapper_effects::ScriptEffect;
 use mapper_inference::time_history::{Shape, TimeHistory};
 use mapper_numerics::parallel;
-use mapper_observe::averages::time_table::Table;
+use mapper_observe::averages::Table;
 use mapper_physics::rig::effect::{Effect, Rig, add};
 use mapper_physics::simulation::model::Model;
 use std::path::Path;

@@ -11,7 +11,7 @@ use crate::gap::residuals::whiten::Linearised;
 use crate::inside::gap::common;
 use crate::inside::gap::common::{Visits, declared};
 use mapper_numerics::parallel;
-use mapper_observe::averages::time_table::Table;
+use mapper_observe::averages::Table;
 use mapper_physics::rig::effect::{Effect, EffectParameter, Rig, add};
 use mapper_physics::simulation::model::Model;
 

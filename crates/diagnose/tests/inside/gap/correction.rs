@@ -1,10 +1,10 @@
 //! Readings without the causes of a gap.
 
-use crate::gap::correction::Changes;
+use crate::gap::consequence::Changes;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::inside::gap::common::{Visits, declared, record_of};
 use mapper_core::{Channel, Recording};
-use mapper_observe::averages::time_table::Table;
+use mapper_observe::averages::Table;
 use mapper_physics::rig::effect::{Rig, add};
 use mapper_physics::simulation::model::Model;
 

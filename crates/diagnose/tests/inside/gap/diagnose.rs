@@ -8,7 +8,6 @@ use crate::gap::diagnose::{Diagnosed, gap};
 use crate::gap::findings::experiment::{AllowedJump, Experiment};
 use crate::gap::findings::report::Verdict;
 use crate::gap::findings::warning::GapWarning;
-use crate::gap::joint::{Over, Persistence, Value};
 use crate::gap::next_experiment::outlook::{approximate_separation, separation};
 use crate::gap::preconditions::{GapError, Problem, usable};
 use crate::gap::request::RigRecording;
@@ -17,7 +16,7 @@ use crate::gap::residuals::study::Study;
 use crate::inside::gap::common;
 use crate::inside::gap::common::{Visits, boundary, declared, effects, request};
 use mapper_core::{Channel, Dimension, OperatingPoint, Recording, Series};
-use mapper_observe::averages::time_table::Table;
+use mapper_observe::averages::Table;
 use mapper_observe::declared::CommonOffset;
 use mapper_physics::rig::effect::{Effect, Rig, add};
 use mapper_physics::simulation::model::Model;
@@ -58,17 +57,6 @@ fn a_run_in_real_time_is_late_and_its_rig_is_not_to_blame() {
         (diagnosed.diagnosis.verdict, first.effects.as_slice()),
         (Verdict::Explained, ["bearing_friction".to_owned()].as_slice())
     );
-}
-
-/// A second run of the same rig with other points.
-const NEXT: Visits = Visits { speeds_rpm: &[100e3, 65e3, 125e3, 85e3, 110e3], dwell_s: 60.0 };
-
-fn next_night(effects: &[(&str, &[f64])], seed: u64) -> Recording {
-    let mut rig = Rig::new(Model::nominal());
-    for (id, values) in effects {
-        add(&mut rig, mapper_effects::find(id).unwrap().as_ref(), values).unwrap();
-    }
-    common::record_of(&rig, &NEXT, seed)
 }
 
 /// With a few candidates only; `mapper gap blind` tests the search over all of them.
@@ -375,36 +363,6 @@ fn the_model_calibrated_in_one_night_forecasts_the_next() {
     assert!(held.ratio < 1.2 && (0.92..0.99).contains(&held.inside), "{held:?}");
     let nominal = Found { effects: Vec::new(), ..found };
     assert!(check(&nominal).is_err(), "its covariance is of another machine");
-}
-
-/// Two recordings of a rig with a slow probe, and a third with a new probe and a rubbing bearing: each cause has its persistence. Two recordings
-/// know the probe better than one, but not better than two independent ones.
-#[test]
-fn causes_persist_come_and_go_over_the_nights() {
-    let probe: (&str, &[f64]) = ("tip_diameter", &[2e-3]);
-    let friction: (&str, &[f64]) = ("bearing_friction", &[1e-6]);
-    let nights: Vec<Diagnosed> =
-        [record(&[probe], 31), next_night(&[probe], 31), next_night(&[friction], 31)]
-            .iter()
-            .map(|recording| ask(recording).unwrap())
-            .collect();
-    let nights: Vec<&Diagnosed> = nights.iter().collect();
-    let calibration = Calibration::shipped().unwrap();
-    let over = Over::recordings(&nights, &calibration);
-    let persistence = |id: &str| over.iter().find(|cause| cause.effect == id).unwrap().persistence;
-    assert_eq!(
-        (persistence("tip_diameter"), persistence("bearing_friction")),
-        (Persistence::Disappeared, Persistence::Appeared),
-        "{over:?}"
-    );
-    let two = Over::recordings(&nights[..2], &calibration);
-    let probe = &two[0];
-    assert_eq!((probe.effect.as_str(), probe.persistence), ("tip_diameter", Persistence::Persists));
-    let width = |value: &Value| value.high - value.low;
-    let narrowest = probe.each.iter().map(width).fold(f64::INFINITY, f64::min);
-    let separation = 1.0 / probe.each.iter().map(|v| width(v).powi(-2)).sum::<f64>().sqrt();
-    let together = width(&probe.together);
-    assert!(together < narrowest && together > 0.99 * separation, "{together} {narrowest} {separation}");
 }
 
 /// The bearing begins to rub during a recording.

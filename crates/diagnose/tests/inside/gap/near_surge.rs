@@ -12,7 +12,7 @@ use crate::gap::residuals::true_inputs::Actuators;
 use crate::gap::residuals::whiten::Linearised;
 use crate::inside::gap::common::{channels, declared};
 use mapper_core::{Channel, Recording, Series, StepKind, StepMarker};
-use mapper_observe::averages::time_table::Table;
+use mapper_observe::averages::Table;
 use mapper_observe::model_inputs::lagged_command::{LaggedCommand, Level, Response};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::true_value;

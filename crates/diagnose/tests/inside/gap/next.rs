@@ -10,7 +10,7 @@ use crate::gap::next_experiment::best_experiment::{Rivals, Suggested, next};
 use crate::gap::next_experiment::outlook::separation;
 use crate::inside::gap::common::{self, Visits, boundary, declared};
 use mapper_core::{Channel, OperatingPoint, Recording, StepKind, StepMarker};
-use mapper_observe::averages::time_table::Table;
+use mapper_observe::averages::Table;
 use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_physics::machine::params::BoundaryConditions;

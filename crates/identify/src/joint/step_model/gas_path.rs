@@ -7,7 +7,7 @@ use mapper_physics::laws::compression::{
     Wheel, after_wheel, before_wheel, compressed_k, isentropic_rise_ratio,
 };
 use mapper_physics::laws::convection::{self, InletLaw};
-use mapper_physics::rig::sensor_fault::Rest;
+use mapper_physics::rig::sensor_fault::ExactReadings;
 
 /// Minimum efficiency of the model. Bound: keeps the temperature rise finite while a fit searches.
 const MIN_ETA: f64 = 0.02;
@@ -98,7 +98,7 @@ pub(crate) struct Setting {
     pub(crate) outlet_diameter_m: f64,
     pub(crate) inlet_diameter_m: f64,
     /// Readings from which gain errors count.
-    pub(crate) rest: Rest,
+    pub(crate) rest: ExactReadings,
     /// The compressed air.
     pub(crate) air: Air,
     /// Reynolds number at which the law's coefficient is defined.

@@ -22,7 +22,7 @@ use crate::joint::step_model::parameters::{
 };
 use crate::joint::step_model::rows::{MAX_ROW_GAP_S, Row};
 use crate::joint::step_model::surface::{TERM_COUNT, dot};
-use mapper_physics::rig::sensor_fault::Rest;
+use mapper_physics::rig::sensor_fault::ExactReadings;
 
 /// Exponent below which the mean over a row replaces the formula. Bound: the next term is below rounding.
 const SERIES_BELOW: f64 = 1e-6;
@@ -63,12 +63,12 @@ pub(crate) fn inner_wall(shared: &SharedVector) -> (f64, f64) {
 }
 
 /// Tc without its errors, K.
-fn outer_k(row: &Row, shared: &SharedVector, rest: Rest) -> f64 {
+fn outer_k(row: &Row, shared: &SharedVector, rest: ExactReadings) -> f64 {
     row.tc_k + shared[TC_LAG] * row.tc_slope_k_s - tc_error_k(row.tc_k, shared, rest)
 }
 
 /// Error of T2 at the temperature of its probe's tip, K. At the reading, the noise would be part of the prediction, and a gain would be fitted to it.
-fn t2_error_k(probe_k: f64, shared: &SharedVector, rest: Rest) -> f64 {
+fn t2_error_k(probe_k: f64, shared: &SharedVector, rest: ExactReadings) -> f64 {
     shared[OFFSETS + 1] + shared[THERMOMETERS] + shared[GAINS] * (probe_k - rest.temperature_k)
 }
 

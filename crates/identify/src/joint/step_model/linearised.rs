@@ -13,7 +13,7 @@ use crate::joint::step_model::rows::{Row, StepRows};
 use crate::joint::step_model::surface::{TERM_COUNT, dot};
 use crate::single_step::probe::{self, Lag, follow};
 use mapper_core::unit_factors::M_PER_MM;
-use mapper_physics::rig::sensor_fault::Rest;
+use mapper_physics::rig::sensor_fault::ExactReadings;
 
 /// Step of the derivative by the square of the probe's diameter, relative. Bound: between rounding and curvature.
 const PROBE_STEP_RATIO: f64 = 1e-3;
@@ -279,7 +279,7 @@ impl Linearised<'_> {
             .chain(&self.step.rows)
             .skip(history.terms.len() - self.states.len())
             .collect();
-        let Rest { pressure_pa: rest_pa, temperature_k: rest_k } = self.model.setting.rest;
+        let ExactReadings { pressure_pa: rest_pa, temperature_k: rest_k } = self.model.setting.rest;
         let by = |change: &dyn Fn(&RowState, &Row, usize) -> Change| {
             self.respond(|i, state| change(state, rows[i], i), start_k)
         };
@@ -391,7 +391,7 @@ fn integral(rows: &[Row], rates: &[f64]) -> Vec<f64> {
     sums
 }
 
-pub(super) fn tc_error_k(read_k: f64, shared: &SharedVector, rest: Rest) -> f64 {
+pub(super) fn tc_error_k(read_k: f64, shared: &SharedVector, rest: ExactReadings) -> f64 {
     shared[OFFSETS + 2] + shared[THERMOMETERS] + shared[GAINS + 1] * (read_k - rest.temperature_k)
 }
 
@@ -416,7 +416,7 @@ mod tests {
             internal_area_m2: config.internal_area_m2,
             outlet_diameter_m: config.outlet_diameter_m,
             inlet_diameter_m: config.inlet_diameter_m,
-            rest: Rest { pressure_pa: 100e3, temperature_k: 297.0 },
+            rest: ExactReadings { pressure_pa: 100e3, temperature_k: 297.0 },
             air: config.air,
             reynolds_reference: 1.3e5,
         };

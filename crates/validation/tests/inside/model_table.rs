@@ -2,8 +2,6 @@
 //! openings 0.5, 0.7 and 1.0, noise-free, 10 to 110 s, errors against the mean in the window unless stated otherwise.
 //! Tolerances are half the last printed digit.
 
-#![cfg(test)]
-
 use crate::reproduction::figures::figure_5::apparent_eta;
 use crate::reproduction::lab::{
     Outcome, RUN_S, Run, WINDOW, dynamic_config, extremes, identify_runs, run_all, truth_in_window, worst,

@@ -19,7 +19,7 @@ pub mod same_machine;
 pub mod total_pressure;
 
 pub use declared::{Declared, declared_uncertainties};
-pub use measured_stand::{MeasuredValue, measure_actuators};
+pub use measured_stand::{Fitted, MeasuredValue, measure_actuators};
 pub use redundant_sensors::element_fault::{Contradiction, ElementFault, FaultyElement, FusedChannel};
 pub use redundant_sensors::fuse::{fuse, judge_elements};
 pub use same_machine::{OtherMachine, same_machine};

@@ -30,7 +30,7 @@ const MAX_ITERATIONS: usize = 12;
 const CONVERGED_RATIO: f64 = 1e-7;
 /// Distance of finite differences: s for times, in the logarithm of the rate. Bound: a tenth of a sample interval.
 const DIFFERENCE: f64 = 5e-3;
-/// Smallest factor of a shortened step. Bound: a shorter one is no progress.
+/// Smallest share of a shortened step. Bound: a shorter one is no progress.
 const MIN_STEP_SHARE: f64 = 1e-2;
 /// Range of rates that are searched for the slowest possible one, in largest jumps per second. Bound: slower ones are no jumps.
 const SLOWEST_RATE: f64 = 1e-3;
@@ -38,11 +38,14 @@ const SLOWEST_RATE: f64 = 1e-3;
 const MAX_CORRELATED: usize = 50;
 /// Share of a step at its end in which a valve has settled. Bound: the rest is several lags.
 const SETTLED_SHARE: f64 = 0.4;
-/// Resolution of play and dead band, opening, and the largest ones that are searched. Bound: noise of the flow over ten seconds; a drive with more
-/// is broken.
+/// Resolution of play and dead band, opening. Bound: noise of the flow over ten seconds.
 const RESOLUTION: f64 = 5e-4;
+/// Largest play that is searched, opening. Bound: a drive with more is broken.
 const MAX_PLAY: f64 = 0.1;
+/// Largest dead band that is searched, opening. Bound: more than the small steps of a commissioning together.
 const MAX_DEAD_BAND: f64 = 0.03;
+/// Share of a distribution below the upper end of its 95 % interval. Source: definition.
+const UPPER_SHARE: f64 = 0.975;
 
 /// A value with the ends of its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -319,9 +322,8 @@ impl<'a> Jumps<'a> {
         };
         let most = best.cost + SIGMAS_95 * SIGMAS_95 * best.variance;
         let is_excluded = |ln_rate: f64| at(ln_rate).is_none_or(|fit| fit.cost > most);
-        let fastest = size / best.parameters[0].max(self.table.interval_s);
-        let (low, high) = ((SLOWEST_RATE * size).ln(), fastest.ln());
-        let (_, ln_rate) = bisect(low, high, DIFFERENCE, is_excluded);
+        let fastest = (size / best.parameters[0].max(self.table.interval_s)).ln();
+        let (_, ln_rate) = bisect((SLOWEST_RATE * size).ln(), fastest, DIFFERENCE, is_excluded);
         Some((ln_rate.exp(), at(ln_rate)?.parameters[0]))
     }
 }
@@ -344,7 +346,6 @@ struct Settled<'a> {
 }
 
 impl<'a> Settled<'a> {
-    /// `None` if there are too few.
     fn new(
         table: &Table,
         areas_m2: &[f64],
@@ -373,10 +374,9 @@ impl<'a> Settled<'a> {
         let drive = Response { play, dead_band, ..Response::lag(0.0) };
         let path = Path::new(self.commands.iter().copied(), drive, before);
         let middle_s = mean(self.levels.iter().map(|(t_s, _)| *t_s))?;
-        let row = |t_s: f64| (path.output(t_s), path.output(t_s) * (t_s - middle_s));
         let (mut aa, mut ab, mut bb, mut ay, mut by, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for (t_s, y) in &self.levels {
-            let (a, b) = row(*t_s);
+            let (a, b) = (path.output(*t_s), path.output(*t_s) * (t_s - middle_s));
             (aa, ab, bb) = (aa + a * a, ab + a * b, bb + b * b);
             (ay, by, yy) = (ay + a * y, by + b * y, yy + y * y);
         }
@@ -398,7 +398,7 @@ impl<'a> Settled<'a> {
         let best = tried.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
         // Play, dead band, area and its drift.
         let free = (self.levels.len() - 4) as f64;
-        let t = student_quantile(0.975, free)?;
+        let t = student_quantile(UPPER_SHARE, free)?;
         let most = best.0 * (1.0 + t * t / free);
         let accepted = || tried.iter().filter(|(cost, ..)| *cost <= most);
         let interval = |of: fn(&(f64, f64, f64, f64)) -> f64| {

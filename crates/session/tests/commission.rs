@@ -53,9 +53,9 @@ fn commission(lab: &str, declared: &str, seed: u64) -> Vec<MeasuredValue> {
     };
     let commissioning = Commissioning::new(&campaign, &model).unwrap();
     let mut backend = registry.make_backend(&campaign, &model).unwrap();
-    let mut steps = PlanSteps::new(commissioning.plan());
+    let mut steps = PlanSteps::new(&commissioning.plan);
     let mut memory = Memory::default();
-    let under = commissioning.campaign();
+    let under = &commissioning.campaign;
     let end =
         drive(under, &model, &mut steps, backend.as_mut(), &mut memory, &AtomicBool::new(false)).unwrap();
     assert_eq!(end, RunEnding::Completed, "{lab}");

@@ -1,13 +1,13 @@
 //! `mapper rig commission`.
 
-use crate::commands::run::{ending_failure, expand_home, parse_pace};
+use crate::commands::run::{ending_failure, expand_home};
 use crate::environment::{SystemClock, registry, rig_states_directory, today};
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
 use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_campaign::{actuator_lines, read_named_file, with_actuators};
-use mapper_core::{Channel, PacedClock, UnpacedClock};
+use mapper_core::{PacedClock, UnpacedClock};
 use mapper_recording::ChannelMap;
 use mapper_report::{
     commissioning_document, commissioning_json, plan_document, values_to_declare, with_messages,
@@ -33,9 +33,6 @@ pub struct Commission {
     /// Parent of the run directory, instead of the campaign's `outputs.directory`
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Pace of the rig's time, as for `mapper run`
-    #[arg(long, value_name = "FACTOR", value_parser = parse_pace, hide_short_help = true)]
-    pub pace: Option<f64>,
 }
 
 impl Commission {
@@ -69,22 +66,18 @@ impl Commission {
             .prepare_commissioning(&commissioning, request)
             .map_err(|error| Failure::in_campaign(error, &self.campaign))?;
         if !as_json {
-            standard_output::show(&plan_document(commissioning.campaign(), prepared.plan()))?;
+            standard_output::show(&plan_document(&commissioning.campaign, prepared.plan()))?;
         }
         if self.dry_run {
             let dry_run = || json!({"dry_run": true, "rig": prepared.rig(), "plan": prepared.plan()});
             return if as_json { standard_output::print_json(&with_messages(dry_run)) } else { Ok(()) };
         }
         stop.enter(Phase::Rig);
-        let rig = prepared.rig();
-        let RecordedRun { directory, recording, end } =
-            match self.pace.or((!rig.simulated_time).then_some(1.0)) {
-                Some(pace) => {
-                    let mut clock = PacedClock::new(SystemClock::new(), pace);
-                    prepared.record_paced(&session, &mut clock, true)?
-                }
-                None => prepared.record_paced(&session, &mut UnpacedClock, false)?,
-            };
+        let (_, run) = match prepared.rig().simulated_time {
+            true => prepared.record_paced(&session, &mut UnpacedClock, false)?,
+            false => prepared.record_paced(&session, &mut PacedClock::new(SystemClock::new(), 1.0), true)?,
+        };
+        let RecordedRun { directory, recording, end, .. } = run;
         progress.clear();
         let end = end.map_err(|source| SessionError::Run { source, recording: recording.clone() })?;
         if let Some(failure) = ending_failure(&end) {
@@ -93,18 +86,16 @@ impl Commission {
         let read = Recorded::read(&registry, &directory, &ChannelMap::native(), Some(&campaign))?;
         let values = commissioning.measure(&read.read.recording);
         if values.is_empty() {
-            let needed = [Channel::P3, Channel::CompressorFlow, Channel::P2, Channel::T2, Channel::T3];
-            let needed = needed.map(|channel| channel.to_string()).join(", ");
-            let message = format!("no actuator could be measured: the recording needs readings of {needed}");
+            let message = "no actuator could be measured: the rig must read P3, m_c, P2, T2 and T3";
             return Err(Failure::new(Code::BadRecording, message));
         }
         let lines = actuator_lines(&values_to_declare(&values));
         let different: Vec<_> = values.iter().copied().filter(|value| !value.agrees()).collect();
         if as_json {
-            let campaign_lines = json!({"run": directory, "recording": recording, "lines": lines});
-            let mut value = campaign_lines;
-            value["actuators"] = commissioning_json(&values);
-            standard_output::print_json(&value)?;
+            let actuators = commissioning_json(&values);
+            let run =
+                json!({"run": directory, "recording": recording, "lines": lines, "actuators": actuators});
+            standard_output::print_json(&run)?;
         } else {
             standard_output::show(&commissioning_document(&values))?;
             if !self.write && !different.is_empty() {
@@ -136,14 +127,11 @@ impl Commission {
     }
 }
 
-/// The lines that differ, those before with `-`, those after with `+`. All changes are in one element, so that one block contains them.
+/// The lines that only one of the texts has, those before with `-`, those after with `+`.
 fn difference(before: &str, after: &str) -> String {
-    let (before, after): (Vec<&str>, Vec<&str>) = (before.lines().collect(), after.lines().collect());
-    let same = before.iter().zip(&after).take_while(|(a, b)| a == b).count();
-    let rest = before.iter().rev().zip(after.iter().rev()).take_while(|(a, b)| a == b).count();
-    let end = |lines: &[&str]| lines.len() - rest.min(lines.len() - same);
-    let marked = |mark: &str, lines: &[&str]| {
-        lines[same..end(lines)].iter().map(|line| format!("{mark} {line}\n")).collect::<String>()
+    let only = |mark: &str, lines: &str, others: &str| -> String {
+        let new = lines.lines().filter(|line| !others.lines().any(|other| other == *line));
+        new.map(|line| format!("{mark} {line}\n")).collect()
     };
-    format!("{}{}", marked("-", &before), marked("+", &after))
+    only("-", before, after) + only("+", after, before).as_str()
 }

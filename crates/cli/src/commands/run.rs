@@ -60,7 +60,7 @@ pub struct Run {
     pub json: bool,
 }
 
-pub(crate) fn parse_pace(text: &str) -> Result<f64, String> {
+fn parse_pace(text: &str) -> Result<f64, String> {
     let pace = text.parse().ok().filter(|pace: &f64| pace.is_finite() && *pace > 0.0);
     pace.ok_or_else(|| "write a number above 0: 1 is real time, 10 ten times as fast".to_owned())
 }

@@ -1,12 +1,14 @@
 //! Speeds at which a shaft must not stay: critical speeds and resonances of blades. A jump crosses them.
 
-use crate::SpeedControlSettings;
 use serde::{Deserialize, Serialize};
 
 /// Maximum number of ranges. Bound: critical speeds of a shaft and first modes of its blades are fewer.
 const MAX_RANGES: usize = 8;
 /// Resolution of speeds in messages, rpm. Bound: 0.01 krpm; no rig holds a speed more closely.
 const SHOWN_RPM: f64 = 10.0;
+
+/// Band within which a controlled speed counts as reached, ratio. Bound: a third of the smallest change of speed that is a jump.
+pub(crate) const BAND_RATIO: f64 = 0.003;
 
 /// A range of shaft speeds that a jump may cross and no step may hold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -27,8 +29,7 @@ impl AvoidedRange {
 
     /// The speeds that no step may hold, rpm: the range, and the band within which a controlled speed counts as reached.
     fn refused_rpm(&self) -> (f64, f64) {
-        let band_ratio = SpeedControlSettings::BAND_RATIO;
-        (self.from_rpm * (1.0 - band_ratio), self.to_rpm * (1.0 + band_ratio))
+        (self.from_rpm * (1.0 - BAND_RATIO), self.to_rpm * (1.0 + BAND_RATIO))
     }
 
     fn refuses(&self, target_rpm: f64) -> bool {

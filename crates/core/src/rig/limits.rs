@@ -1,5 +1,6 @@
 //! Limits and settings of a run: limits of the machine, soak, speed control, run-down, reaction to drift.
 
+use crate::rig::avoided_speeds::BAND_RATIO;
 use crate::{
     AvoidedSpeeds, Channel, OperatingPoint, RigMode, SafeTrajectory, SetpointRange, SetpointRanges, Setpoints,
 };
@@ -177,8 +178,8 @@ pub struct SpeedControlSettings {
 }
 
 impl SpeedControlSettings {
-    /// Default band, ratio. Bound: a third of the smallest change of speed that is a jump.
-    pub const BAND_RATIO: f64 = 0.003;
+    /// Default band, ratio.
+    pub const BAND_RATIO: f64 = BAND_RATIO;
 }
 
 impl Default for SpeedControlSettings {

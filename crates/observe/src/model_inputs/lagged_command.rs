@@ -286,11 +286,8 @@ pub(crate) struct Search {
     pub(crate) rates: &'static [f64],
 }
 
-impl Search {
-    /// In the recording of a campaign.
-    const IN_CAMPAIGN: Search =
-        Search { around_s: AROUND_S, min_cost_reduction: MIN_COST_REDUCTION, rates: &RATES };
-}
+const IN_CAMPAIGN: Search =
+    Search { around_s: AROUND_S, min_cost_reduction: MIN_COST_REDUCTION, rates: &RATES };
 
 /// Reduction of the sum of squared residuals, relative to their mean square, above which a rate limit or a dead time is accepted. Bound: ten
 /// standard deviations of white noise, five of coloured noise over the half second of a ramp. A wrongly accepted one has no effect, because a
@@ -305,7 +302,7 @@ pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f
     let jumps = p3_jumps(recording, noise_sigma);
     let sizes = recording.steps.windows(2).map(|pair| (pair[1].p3_pa - pair[0].p3_pa).abs());
     let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
-    estimate_response(table, values, &jumps, (sizes.collect(), Search::IN_CAMPAIGN), |response| {
+    estimate_response(table, values, &jumps, (sizes.collect(), IN_CAMPAIGN), |response| {
         let command = commanded.with_responses(response, Response::lag(0.0));
         move |t_s| command.p3_pa(t_s)
     })
@@ -370,7 +367,7 @@ pub fn measured_valve_response(
     let with_declared = |response: Response| {
         predict(Response { play: declared.play, dead_band: declared.dead_band, ..response })
     };
-    let found = estimate_response(table, &openings, &jumps, (sizes, Search::IN_CAMPAIGN), with_declared)?;
+    let found = estimate_response(table, &openings, &jumps, (sizes, IN_CAMPAIGN), with_declared)?;
     let found = Response { play: declared.play, dead_band: declared.dead_band, ..found };
     let cost_of = |response: Response| sum_of_squares(table, &openings, &jumps, AROUND_S, predict(response));
     // The play that the recording shows is the diagnosis' to name, but without it the lag would be longer.

@@ -73,8 +73,8 @@ pub enum Obstacle {
     #[error("is above the speed limit, `limits.speed` = {} krpm", .limit_rpm / 1e3)]
     Speed { limit_rpm: f64 },
     #[error(
-        "is within the speeds to avoid, `limits.avoid` from {} to {} krpm; the nearest allowed {}",
-        .range.from_rpm / 1e3, .range.to_rpm / 1e3, nearest_speeds(.nearest_rpm)
+        "is within the speeds to avoid, `limits.avoid` from {} to {} krpm; allowed next to them: {}", .range.from_rpm / 1e3,
+        .range.to_rpm / 1e3, .nearest_rpm.iter().map(|rpm| readable(*rpm, "rpm")).collect::<Vec<_>>().join(" and ")
     )]
     Avoided { range: AvoidedRange, nearest_rpm: Vec<f64> },
     #[error(
@@ -102,15 +102,6 @@ pub enum Obstacle {
         "has T3 = {}, above `limits.turbine_inlet_temperature` = {}", temperature(*.t3_k), temperature(*.limit_k)
     )]
     T3 { t3_k: f64, limit_k: f64 },
-}
-
-/// Names the nearest allowed speeds, after "the nearest allowed".
-fn nearest_speeds(nearest_rpm: &[f64]) -> String {
-    let shown = |rpm: &f64| readable(*rpm, "rpm");
-    match nearest_rpm {
-        [below_rpm, above_rpm] => format!("speeds are {} and {}", shown(below_rpm), shown(above_rpm)),
-        other => format!("speed is {}", other.iter().map(shown).collect::<String>()),
-    }
 }
 
 impl Obstacle {

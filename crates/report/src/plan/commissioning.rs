@@ -3,7 +3,7 @@
 use crate::document::{Document, Table};
 use crate::formatting::significant_digits;
 use mapper_core::with_unit;
-use mapper_observe::MeasuredValue;
+use mapper_observe::{Fitted, MeasuredValue};
 use serde_json::{Value, json};
 
 /// Significant digits of a value. Bound: intervals of commissionings are wider than a per cent.
@@ -11,8 +11,8 @@ const DIGITS: usize = 3;
 
 /// The measured values, and whether the campaign agrees with them.
 pub fn commissioning_document(values: &[MeasuredValue]) -> Document {
-    let mut table = Table::new(["value", "declared", "measured", "95 % interval", "declaration"])
-        .with_texts([0, 1, 2, 3, 4]);
+    let mut table =
+        Table::new(["value", "declared", "measured (95 %)", "declaration"]).with_texts([0, 1, 2, 3]);
     for value in values {
         let actuator = match value.actuator {
             "turbine_inlet_pressure" => "P3",
@@ -23,7 +23,6 @@ pub fn commissioning_document(values: &[MeasuredValue]) -> Document {
             format!("{actuator} {}", value.key),
             text(value, value.declared),
             measured(value),
-            interval(value),
             if value.agrees() { "agrees" } else { "differs" }.to_owned(),
         ]);
     }
@@ -59,19 +58,9 @@ fn text(value: &MeasuredValue, number: f64) -> String {
 }
 
 fn measured(value: &MeasuredValue) -> String {
-    match value.measured.value.is_finite() {
-        true => text(value, value.measured.value),
-        false => "no limit seen".to_owned(),
-    }
-}
-
-fn interval(value: &MeasuredValue) -> String {
-    match value.measured.high.is_finite() {
-        true => format!(
-            "{} to {}",
-            significant_digits(value.measured.low, DIGITS),
-            text(value, value.measured.high)
-        ),
-        false => format!("at least {}", text(value, value.measured.low)),
+    let Fitted { value: found, low, high } = value.measured;
+    match high.is_finite() {
+        true => format!("{} ({} to {})", text(value, found), text(value, low), text(value, high)),
+        false => format!("at least {}", text(value, low)),
     }
 }

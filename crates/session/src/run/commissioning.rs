@@ -4,13 +4,13 @@ use crate::SessionError;
 use crate::plan::planning::hash_inputs;
 use mapper_campaign::Campaign;
 use mapper_core::{
-    ActuatorMotion, GuardSet, OperatingPoint, Plan, PlanFigures, PlanStep, Predicted, Recording,
-    RigActuators, StepKind, Timing,
+    ActuatorMotion, OperatingPoint, Plan, PlanFigures, PlanStep, Predicted, Recording, RigActuators,
+    StepKind, Timing,
 };
 use mapper_observe::{MeasuredValue, measure_actuators};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::reach::{describe_obstacles, reach};
-use mapper_physics::operating_point::transition_forecast::{Stand, TransitionForecast, forecast_transition};
+use mapper_physics::operating_point::transition_forecast::{Stand, forecast_transition};
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::steady::SteadyState;
 
@@ -22,8 +22,6 @@ const LOW_SPEED_RATIO: f64 = 0.5;
 const MIDDLE_SHARE: f64 = 0.7;
 /// Change of the opening, relative. Bound: more than the play of a broken drive, and less than the distance from choke to surge.
 const OPENING_CHANGE_RATIO: f64 = 0.3;
-/// Largest play that the change of the opening must exceed twice, opening.
-const MAX_PLAY_RATIO: f64 = 0.05;
 /// Size and number of small steps of the opening, which find the dead band. Judgement: a positioner resolves a quarter of a per cent.
 const STAIR_RATIO: f64 = 0.0025;
 const STAIRS: usize = 10;
@@ -45,8 +43,10 @@ const OPEN_LOOP_BAND_RATIO: f64 = 0.25;
 /// speed, and with commands that jump.
 #[derive(Debug)]
 pub struct Commissioning {
-    pub(crate) campaign: Campaign,
-    pub(crate) plan: Plan,
+    /// The campaign under which the steps run.
+    pub campaign: Campaign,
+    /// The steps.
+    pub plan: Plan,
     declared: RigActuators,
 }
 
@@ -68,13 +68,10 @@ impl Commissioning {
             t3: jumping(declared.t3),
             ..declared
         };
-        let guards = campaign.guards.clone().map(|set| GuardSet {
-            speed: set.speed.map(|mut band| {
-                band.band_ratio = band.band_ratio.max(OPEN_LOOP_BAND_RATIO);
-                band
-            }),
-            ..set
-        });
+        let mut guards = campaign.guards.clone();
+        if let Some(band) = guards.as_mut().and_then(|set| set.speed.as_mut()) {
+            band.band_ratio = band.band_ratio.max(OPEN_LOOP_BAND_RATIO);
+        }
         let variant = Campaign {
             zero: None,
             sequence: None,
@@ -114,16 +111,6 @@ impl Commissioning {
         )))
     }
 
-    /// The campaign under which the steps run.
-    pub fn campaign(&self) -> &Campaign {
-        &self.campaign
-    }
-
-    /// The planned steps.
-    pub fn plan(&self) -> &Plan {
-        &self.plan
-    }
-
     /// The actuators in the recording of these steps, next to the declared ones.
     pub fn measure(&self, recording: &Recording) -> Vec<MeasuredValue> {
         let pipe = (self.campaign.boundary.p1_pa, self.campaign.machine.params.outlet.volume_m3);
@@ -141,7 +128,7 @@ fn stages(campaign: &Campaign, base: OperatingPoint) -> Vec<Stage> {
     let at_opening =
         |more: f64| OperatingPoint { valve_opening_ratio: base.valve_opening_ratio + more, ..base };
     let (low, middle) = (at_speed(low_rpm), at_speed(low_rpm + MIDDLE_SHARE * (base.speed_rpm - low_rpm)));
-    let change = (OPENING_CHANGE_RATIO * base.valve_opening_ratio).max(2.0 * MAX_PLAY_RATIO);
+    let change = OPENING_CHANGE_RATIO * base.valve_opening_ratio;
     let (half, open) = (at_opening(0.5 * change), at_opening(change));
     let mut stages: Vec<Stage> =
         [base, low, base, middle, base, low, base].map(|point| (point, 0.0, P3_S)).to_vec();
@@ -178,8 +165,12 @@ fn plan_steps(
                 let stand = Stand { limits: &campaign.limits, actuators: &actuators };
                 let jump = forecast_transition(model, start.state, (start, &target), stand, dwell_s)
                     .map_err(|error| error.to_string())?;
-                if let Some(reason) = reason_against(&jump, campaign) {
+                if let Some(violation) = jump.violations.first() {
+                    let reason = mapper_planner::Rejection::from(*violation);
                     return Err(format!("the jump from {from} to {point}: {reason}"));
+                }
+                if campaign.limits.t2_max_k.is_some_and(|limit_k| jump.step.highest_t2_k > limit_k) {
+                    return Err(format!("the jump from {from} to {point} exceeds the limit of T2"));
                 }
                 transition = Some(jump.transition);
             }
@@ -202,17 +193,6 @@ fn plan_steps(
         before = Some((point, target));
     }
     Ok(steps)
-}
-
-fn reason_against(jump: &TransitionForecast, campaign: &Campaign) -> Option<String> {
-    let too_hot = campaign.limits.t2_max_k.filter(|limit_k| jump.step.highest_t2_k > *limit_k);
-    let hot = too_hot.map(|_| "T2 exceeds its limit".to_owned());
-    let violation = jump
-        .violations
-        .first()
-        .copied()
-        .map(|violation| mapper_planner::Rejection::from(violation).to_string());
-    violation.or(hot)
 }
 
 fn plan_of_steps(campaign: &Campaign, model: &Model, steps: Vec<PlanStep>) -> Result<Plan, SessionError> {

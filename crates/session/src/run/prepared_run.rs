@@ -94,15 +94,13 @@ pub struct RunOutcome {
     pub results: Result<Results, SessionError>,
 }
 
-/// A run without results. The rig is safe and the recording is kept.
-#[derive(Debug)]
+/// A run without results; as [`RunOutcome`].
+#[allow(missing_docs, reason = "the same fields")]
 pub struct RecordedRun {
-    /// The run's directory.
     pub directory: PathBuf,
-    /// Its recording.
     pub recording: PathBuf,
-    /// How it ended; the error if rig or recording failed.
     pub end: Result<RunEnding, RunError>,
+    pub(crate) parts: Vec<RunPart>,
 }
 
 impl RunOutcome {
@@ -228,34 +226,24 @@ impl PreparedRun<'_> {
         if let Some(outcome) = self.finish_complete_run(session)? {
             return Ok(outcome);
         }
-        let (run, recorded, parts) = self.record(session, clock, each_sample)?;
-        let RecordedRun { directory, recording, end } = recorded;
+        let (run, recorded) = self.record_paced(session, clock, each_sample)?;
+        let RecordedRun { directory, recording, end, parts } = recorded;
         move_earlier_results(&directory)?;
         let executed = run.executed(&directory);
         let results = run.results(session, executed, for_files(&end), &directory, &parts);
         Ok(RunOutcome { directory, recording, end, results })
     }
 
-    /// Drives the rig at the pace of a clock and records, without results.
+    /// Drives the rig at the pace of a clock and records, without results. Returns this run too.
     ///
     /// # Errors
     /// As [`PreparedRun::run_paced`].
     pub fn record_paced(
-        self,
-        session: &Session<'_>,
-        clock: &mut dyn Clock,
-        each_sample: bool,
-    ) -> Result<RecordedRun, SessionError> {
-        Ok(self.record(session, clock, each_sample)?.1)
-    }
-
-    /// Returns this run with what it recorded, and all its parts.
-    fn record(
         mut self,
         session: &Session<'_>,
         clock: &mut dyn Clock,
         each_sample: bool,
-    ) -> Result<(Self, RecordedRun, Vec<RunPart>), SessionError> {
+    ) -> Result<(Self, RecordedRun), SessionError> {
         let campaign = self.request.campaign;
         let rig = self.rig();
         if !rig.simulated_time {
@@ -310,7 +298,7 @@ impl PreparedRun<'_> {
             finished?;
         }
         parts.push(RunPart { recording: recording.clone(), soaked: true, saved: None });
-        Ok((self, RecordedRun { directory, recording, end }, parts))
+        Ok((self, RecordedRun { directory, recording, end, parts }))
     }
 
     /// Removes the files of a run whose rig was not armed, and returns the error of the run.

@@ -115,16 +115,6 @@ struct AvoidedRangeFile {
     longest: Option<Quantity<Duration>>,
 }
 
-impl From<&AvoidedRangeFile> for AvoidedRange {
-    fn from(file: &AvoidedRangeFile) -> Self {
-        AvoidedRange {
-            from_rpm: file.from.value,
-            to_rpm: file.to.value,
-            longest_s: value_or(file.longest, AvoidedRange::LONGEST_S),
-        }
-    }
-}
-
 /// Lowest and highest pressure.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -143,6 +133,11 @@ pub(crate) struct PressureRangeFile {
 impl From<&LimitsFile> for Limits {
     fn from(file: &LimitsFile) -> Self {
         let p3 = file.turbine_inlet_pressure;
+        let range = |file: &AvoidedRangeFile| AvoidedRange {
+            from_rpm: file.from.value,
+            to_rpm: file.to.value,
+            longest_s: value_or(file.longest, AvoidedRange::LONGEST_S),
+        };
         Limits {
             speed_max_rpm: file.speed.value,
             p3_min_pa: p3.min.value,
@@ -153,7 +148,7 @@ impl From<&LimitsFile> for Limits {
             surge_margin_min_ratio: file.surge_margin.map(|limit| limit.value),
             housing_gradient_max_k: file.housing_gradient.map(|limit| limit.value),
             overshoot_max_ratio: file.overshoot.map(|limit| limit.value),
-            avoid: file.avoid.iter().map(AvoidedRange::from).collect::<Vec<_>>().into(),
+            avoid: file.avoid.iter().map(range).collect::<Vec<_>>().into(),
         }
     }
 }

@@ -79,7 +79,7 @@ pub struct IdentifyConfig {
     /// One standard deviation of the humidity of `air`, kg/kg: part of the intervals of the joint method.
     pub humidity_sigma_kg_kg: f64,
     /// Readings of an isothermal zero: gain errors count from there.
-    pub rest: ExactReadings,
+    pub exact_at: ExactReadings,
     /// Declared play of the back-pressure valve, opening.
     pub valve_play_ratio: f64,
     /// Error that all absolute pressures share, one standard deviation, Pa: of the barometer to which gauge pressures are added, and what an
@@ -130,7 +130,7 @@ impl Default for IdentifyConfig {
             air: Air::PAPER,
             turbine_gas: Gas::CLOSED_FORM_AIR,
             humidity_sigma_kg_kg: 0.0,
-            rest: ExactReadings::default(),
+            exact_at: ExactReadings::default(),
             valve_play_ratio: 0.0,
             barometer_sigma_pa: 0.0,
             barometer_pa: None,

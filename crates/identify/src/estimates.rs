@@ -2,7 +2,7 @@
 
 use crate::evidence::Evidence;
 use crate::faults::balances::efficiency::FittedEfficiencies;
-use crate::faults::balances::rest::rests;
+use crate::faults::balances::standstill::standstills;
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
 use crate::joint::{DynamicEfficiency, Joint};
@@ -36,12 +36,12 @@ impl Estimated {
     ) -> Self {
         let whole = evidence.is_whole();
         let ends = std::mem::take(&mut evidence.ends);
-        let rests = rests(recording, config);
+        let standstills = standstills(recording, config);
         let likelihood = |fitted: Option<&FittedEfficiencies>| {
-            whole.then(|| faults::likelihood(recording, &ends, fitted, config, nominal, &rests))?
+            whole.then(|| faults::likelihood(recording, &ends, fitted, config, nominal, &standstills))?
         };
         let find = |(likelihood, priors): &(Likelihood, Priors)| {
-            faults::find(likelihood, priors, config.method, &rests)
+            faults::find(likelihood, priors, config.method, &standstills)
         };
         let mut balances = likelihood(None);
         let mut faults = balances.as_ref().map(find).unwrap_or_default();
@@ -58,7 +58,7 @@ impl Estimated {
         if let (Some(fitted), Some(balances), true) =
             (&fitted, &balances, nominal.is_some() && faults.is_empty())
         {
-            let readings = faults::all_readings(recording, &ends, config.rest).unwrap_or_default();
+            let readings = faults::all_readings(recording, &ends, config.exact_at).unwrap_or_default();
             // Without a density of the balances nothing is known of faults.
             let _ = faults::possible::widen(&mut estimates, fitted, &readings, balances, config);
         }

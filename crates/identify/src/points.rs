@@ -92,7 +92,7 @@ fn common_errors(state: &EndState, estimate: &Estimate, config: &IdentifyConfig)
     let relative = |channel: Channel, reading: f64| {
         let declared = config.sensor(channel);
         let relative = (declared.offset_sigma / reading)
-            .hypot(declared.gain_sigma_ratio * config.rest.gain_error(channel, reading) / reading);
+            .hypot(declared.gain_sigma_ratio * config.exact_at.gain_error(channel, reading) / reading);
         // A reading of 0 has no relative error and no position on a map.
         if relative.is_finite() { relative } else { 0.0 }
     };

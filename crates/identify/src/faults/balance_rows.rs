@@ -65,8 +65,8 @@ impl Rows {
                 return 0.0;
             }
             let housing_k = readings.tc_k();
-            let Readings { values, run_ratio, rest, .. } = readings;
-            fault.error_per_unit(CHANNELS[channel], values[channel], housing_k, *run_ratio, *rest)
+            let Readings { values, run_ratio, exact_at, .. } = readings;
+            fault.error_per_unit(CHANNELS[channel], values[channel], housing_k, *run_ratio, *exact_at)
         });
         fault
             .channels
@@ -94,8 +94,9 @@ impl Rows {
         let offsets =
             (0..CHANNELS.len()).map(|channel| self.column(|other, _| f64::from(u8::from(other == channel))));
         let gains = (0..CHANNELS.len()).map(|channel| {
-            let error =
-                |readings: &Readings| readings.rest.gain_error(CHANNELS[channel], readings.values[channel]);
+            let error = |readings: &Readings| {
+                readings.exact_at.gain_error(CHANNELS[channel], readings.values[channel])
+            };
             self.column(|other, readings| if other == channel { error(readings) } else { 0.0 })
         });
         let pressure = |channel: usize| matches!(CHANNELS[channel], Channel::P1 | Channel::P2);

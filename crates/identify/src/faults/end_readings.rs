@@ -30,7 +30,7 @@ pub(crate) struct Readings {
     /// Time since the first step's start over the whole run's length.
     pub(crate) run_ratio: f64,
     /// As in [`IdentifyConfig`].
-    pub(crate) rest: ExactReadings,
+    pub(crate) exact_at: ExactReadings,
     /// The compressed air.
     pub(crate) air: Air,
 }
@@ -46,7 +46,7 @@ pub(crate) fn span_s(recording: &Recording) -> Option<(f64, f64)> {
 const DIFFERENCES: PerChannel = [0.05, 0.05, 0.05, 20.0, 20.0, 1e-5, 20.0];
 
 impl Readings {
-    pub(crate) fn of(end: &Ends, first_s: f64, last_s: f64, rest: ExactReadings) -> Self {
+    pub(crate) fn of(end: &Ends, first_s: f64, last_s: f64, exact_at: ExactReadings) -> Self {
         Readings {
             values: [
                 end.t1_k,
@@ -57,7 +57,7 @@ impl Readings {
                 end.flow_kg_s,
                 end.speed_rpm,
             ],
-            rest,
+            exact_at,
             air: end.air,
             run_ratio: (end.end_s - first_s) / (last_s - first_s).max(f64::MIN_POSITIVE),
         }

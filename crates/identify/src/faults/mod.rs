@@ -17,7 +17,7 @@ use crate::IdentifyConfig;
 use crate::faults::balance_rows::{MACHINE, Machine, Rows};
 use crate::faults::balances::conditions;
 use crate::faults::balances::efficiency::FittedEfficiencies;
-use crate::faults::balances::rest::{self, Rest};
+use crate::faults::balances::standstill::{self, Standstill};
 use crate::faults::balances::valve::{Opening, sides};
 use crate::faults::end_readings::{CHANNELS, MAX_CORRELATED_ROWS, Readings, span_s};
 use crate::faults::found_fault::{FoundFault, Suspect};
@@ -48,9 +48,9 @@ pub(crate) fn likelihood(
     fitted: Option<&FittedEfficiencies>,
     config: &IdentifyConfig,
     nominal: Option<&NominalRig<'_>>,
-    rests: &[Rest],
+    standstills: &[Standstill],
 ) -> Option<(Likelihood, Priors)> {
-    let all = all_readings(recording, ends, config.rest)?;
+    let all = all_readings(recording, ends, config.exact_at)?;
     let readings: Vec<Readings> = all.iter().flatten().copied().collect();
     let opening = |((end, readings), side): ((&Option<Ends>, &Option<Readings>), f64)| {
         let position = end.as_ref()?.valve_opening_ratio - 0.5 * config.valve_play_ratio * side;
@@ -67,7 +67,7 @@ pub(crate) fn likelihood(
     balances.extend(balances::housing::rows(recording, config, &used));
     balances.extend(balances::inlet::rows(recording, &all, config));
     balances.extend(fitted.and_then(|fitted| balances::efficiency::rows(fitted, &all, reference, nominal)));
-    balances.extend(rests.iter().map(|rest| rest.rows.clone()));
+    balances.extend(standstills.iter().map(|at_rest| at_rest.rows.clone()));
     if let Some(nominal) = nominal {
         balances.extend(fitted.and_then(|fitted| balances::convection::rows(fitted, &all, config, nominal)));
         balances.extend(balances::conditions::rows(recording, &all, config, nominal));
@@ -86,7 +86,7 @@ pub(crate) fn find(
     likelihood: &Likelihood,
     priors: &Priors,
     method: Method,
-    rests: &[Rest],
+    standstills: &[Standstill],
 ) -> Vec<FoundFault> {
     let likelier_than = |member: &Member, limit: f64| -> Vec<Suspect> {
         let others = member.alternatives.iter().take_while(|(_, relative)| *relative > limit);
@@ -100,7 +100,7 @@ pub(crate) fn find(
         touches_points: touches_points(suspect(member.index), method)
             || likelier_than(&member, MIN_WEIGHT).into_iter().any(|other| touches_points(other, method)),
         at_rest: match suspect(member.index) {
-            Suspect::Sensor(fault) => rest::seen(rests, &fault, member.value),
+            Suspect::Sensor(fault) => standstill::seen(standstills, &fault, member.value),
             Suspect::Machine(_) => None,
         },
     };
@@ -155,13 +155,13 @@ pub(crate) fn suspect(index: usize) -> Suspect {
 pub(crate) fn all_readings(
     recording: &Recording,
     ends: &[Option<Ends>],
-    rest: ExactReadings,
+    exact: ExactReadings,
 ) -> Option<Vec<Option<Readings>>> {
     let (first_s, last_s) = span_s(recording)?;
     let every = ends.len().div_ceil(MAX_CORRELATED_ROWS).max(1);
     let of = |(position, end): (usize, &Option<Ends>)| {
         let used = end.as_ref().filter(|_| position.is_multiple_of(every))?;
-        Some(Readings::of(used, first_s, last_s, rest))
+        Some(Readings::of(used, first_s, last_s, exact))
     };
     Some(ends.iter().enumerate().map(of).collect())
 }

@@ -427,7 +427,7 @@ pub fn zeroed(
     mut config: IdentifyConfig,
     zero: &IsothermalZero,
 ) -> (Recording, IdentifyConfig) {
-    config.rest = rest(&zero.common);
+    config.exact_at = rest(&zero.common);
     for common in &zero.common {
         add_common_error(&mut config, &common.channels, common.sigma);
     }
@@ -467,7 +467,7 @@ pub fn expected_after_zero(
     soak_s: f64,
     pressure_pa: f64,
 ) -> IdentifyConfig {
-    config.rest.pressure_pa = pressure_pa;
+    config.exact_at.pressure_pa = pressure_pa;
     let used_s = used_s(soak_s, settings);
     for group in groups(settings) {
         let mut members = Vec::new();

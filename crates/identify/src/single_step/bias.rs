@@ -41,7 +41,8 @@ pub(crate) fn declared_effect(
         let sensitivity = sensitivity(fit, samples, geometry, channel);
         let rows = || sensitivity.iter().zip(&samples.rows);
         let by_offset_k = rows().map(|(s, _)| s * declared.offset_sigma).collect();
-        let gain = |row: &Row| declared.gain_sigma_ratio * config.rest.gain_error(channel, row.read(channel));
+        let gain =
+            |row: &Row| declared.gain_sigma_ratio * config.exact_at.gain_error(channel, row.read(channel));
         let by_gain_k = rows().map(|(s, row)| s * gain(row)).collect();
         for (change_k, sigma) in
             [(by_offset_k, declared.offset_sigma), (by_gain_k, declared.gain_sigma_ratio)]

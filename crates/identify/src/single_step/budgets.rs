@@ -76,7 +76,7 @@ fn pressure_ratio(
             format!("gain of {channel}"),
             declared.gain_sigma_ratio,
             "1",
-            by_reading * config.rest.gain_error(channel, reading_pa),
+            by_reading * config.exact_at.gain_error(channel, reading_pa),
         );
         let mean = config.noise().variance_of_mean(samples(channel), config.thresholds.end_mean_s).sqrt();
         push(format!("noise of {channel}"), declared.noise_sigma * mean, "Pa", by_reading);

@@ -113,7 +113,7 @@ pub(crate) fn uncertainty(
         let step = READING_STEP_RATIO * value;
         let moved = |by: f64| apparent_eta(&means.moved(channel, by, config.air), config.air);
         let slope = (moved(step) - moved(-step)) / (2.0 * step);
-        let by_gain = declared.gain_sigma_ratio * config.rest.gain_error(channel, value);
+        let by_gain = declared.gain_sigma_ratio * config.exact_at.gain_error(channel, value);
         let spreads = [declared.offset_sigma, by_gain];
         common.extend(spreads.iter().filter(|sigma| **sigma != 0.0).map(|sigma| slope * sigma));
         declared_square += (slope * declared.noise_sigma).powi(2);

@@ -118,7 +118,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
             Channel::T2 | Channel::Tc => part.tc_k,
             _ => f64::NAN,
         });
-        Readings { values, run_ratio: run_ratio(part), rest: config.rest, air: config.air }
+        Readings { values, run_ratio: run_ratio(part), exact_at: config.exact_at, air: config.air }
     };
     Some(Rows {
         residual: heat_w,

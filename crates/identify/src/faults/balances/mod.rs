@@ -6,5 +6,5 @@ pub(crate) mod efficiency;
 pub(crate) mod head;
 pub(crate) mod housing;
 pub(crate) mod inlet;
-pub(crate) mod rest;
+pub(crate) mod standstill;
 pub(crate) mod valve;

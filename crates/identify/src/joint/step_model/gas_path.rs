@@ -98,7 +98,7 @@ pub(crate) struct Setting {
     pub(crate) outlet_diameter_m: f64,
     pub(crate) inlet_diameter_m: f64,
     /// Readings from which gain errors count.
-    pub(crate) rest: ExactReadings,
+    pub(crate) exact_at: ExactReadings,
     /// The compressed air.
     pub(crate) air: Air,
     /// Reynolds number at which the law's coefficient is defined.

@@ -63,13 +63,13 @@ pub(crate) fn inner_wall(shared: &SharedVector) -> (f64, f64) {
 }
 
 /// Tc without its errors, K.
-fn outer_k(row: &Row, shared: &SharedVector, rest: ExactReadings) -> f64 {
-    row.tc_k + shared[TC_LAG] * row.tc_slope_k_s - tc_error_k(row.tc_k, shared, rest)
+fn outer_k(row: &Row, shared: &SharedVector, exact_at: ExactReadings) -> f64 {
+    row.tc_k + shared[TC_LAG] * row.tc_slope_k_s - tc_error_k(row.tc_k, shared, exact_at)
 }
 
 /// Error of T2 at the temperature of its probe's tip, K. At the reading, the noise would be part of the prediction, and a gain would be fitted to it.
-fn t2_error_k(probe_k: f64, shared: &SharedVector, rest: ExactReadings) -> f64 {
-    shared[OFFSETS + 1] + shared[THERMOMETERS] + shared[GAINS] * (probe_k - rest.temperature_k)
+fn t2_error_k(probe_k: f64, shared: &SharedVector, exact_at: ExactReadings) -> f64 {
+    shared[OFFSETS + 1] + shared[THERMOMETERS] + shared[GAINS] * (probe_k - exact_at.temperature_k)
 }
 
 /// Mean of `exp(-x s)` over s from 0 to 1.
@@ -85,9 +85,9 @@ impl Model {
         shared: &SharedVector,
         local: &LocalVector,
     ) -> Inputs {
-        let rest = self.setting.rest;
-        let outer_k = outer_k(row, shared, rest);
-        let [p1_pa, p2_pa] = pressures_pa(row, shared, rest.pressure_pa);
+        let exact_at = self.setting.exact_at;
+        let outer_k = outer_k(row, shared, exact_at);
+        let [p1_pa, p2_pa] = pressures_pa(row, shared, exact_at.pressure_pa);
         Inputs {
             t1_k: row.t1_k - shared[OFFSETS] - shared[THERMOMETERS],
             wall_k: outer_k,
@@ -131,8 +131,8 @@ impl Model {
             self.linearised(history, shared, local, derivatives.then_some(with_model), before)
         };
         let mut readings_k = linearised.probe.read(&linearised.gas_k, local[FIRST_READING]);
-        let rest = self.setting.rest;
-        readings_k.iter_mut().for_each(|reading_k| *reading_k += t2_error_k(*reading_k, shared, rest));
+        let exact_at = self.setting.exact_at;
+        readings_k.iter_mut().for_each(|reading_k| *reading_k += t2_error_k(*reading_k, shared, exact_at));
         if self.has_balance {
             readings_k.extend(linearised.tc_k(shared));
         }

@@ -154,7 +154,7 @@ impl Linearised<'_> {
             .into_iter()
             .zip(rows)
             .map(|(change_k, row)| {
-                start_k + change_k + tc_error_k(row.tc_k, shared, self.model.setting.rest)
+                start_k + change_k + tc_error_k(row.tc_k, shared, self.model.setting.exact_at)
                     - shared[TC_LAG] * row.tc_slope_k_s
             })
             .collect()
@@ -279,7 +279,7 @@ impl Linearised<'_> {
             .chain(&self.step.rows)
             .skip(history.terms.len() - self.states.len())
             .collect();
-        let ExactReadings { pressure_pa: rest_pa, temperature_k: rest_k } = self.model.setting.rest;
+        let ExactReadings { pressure_pa: rest_pa, temperature_k: rest_k } = self.model.setting.exact_at;
         let by = |change: &dyn Fn(&RowState, &Row, usize) -> Change| {
             self.respond(|i, state| change(state, rows[i], i), start_k)
         };
@@ -391,8 +391,8 @@ fn integral(rows: &[Row], rates: &[f64]) -> Vec<f64> {
     sums
 }
 
-pub(super) fn tc_error_k(read_k: f64, shared: &SharedVector, rest: ExactReadings) -> f64 {
-    shared[OFFSETS + 2] + shared[THERMOMETERS] + shared[GAINS + 1] * (read_k - rest.temperature_k)
+pub(super) fn tc_error_k(read_k: f64, shared: &SharedVector, exact_at: ExactReadings) -> f64 {
+    shared[OFFSETS + 2] + shared[THERMOMETERS] + shared[GAINS + 1] * (read_k - exact_at.temperature_k)
 }
 
 /// The surface coefficients among the shared parameters.
@@ -416,7 +416,7 @@ mod tests {
             internal_area_m2: config.internal_area_m2,
             outlet_diameter_m: config.outlet_diameter_m,
             inlet_diameter_m: config.inlet_diameter_m,
-            rest: ExactReadings { pressure_pa: 100e3, temperature_k: 297.0 },
+            exact_at: ExactReadings { pressure_pa: 100e3, temperature_k: 297.0 },
             air: config.air,
             reynolds_reference: 1.3e5,
         };

@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 
 /// What a group of sensors reads in a standstill.
 #[derive(Debug, Clone)]
-pub(crate) struct Rest {
+pub(crate) struct Standstill {
     pub(crate) rows: Rows,
     seen: SeenAtRest,
 }
@@ -30,12 +30,16 @@ struct Member {
 }
 
 /// One balance for each group and standstill: every reading minus that of the first member.
-pub(crate) fn rests(recording: &Recording, config: &IdentifyConfig) -> Vec<Rest> {
+pub(crate) fn standstills(recording: &Recording, config: &IdentifyConfig) -> Vec<Standstill> {
     let Some(span_s) = span_s(recording) else { return Vec::new() };
-    all_at_rest(recording, config).iter().filter_map(|at_rest| rest(at_rest, config, span_s)).collect()
+    all_at_rest(recording, config).iter().filter_map(|at_rest| standstill(at_rest, config, span_s)).collect()
 }
 
-fn rest(at_rest: &AtRest, config: &IdentifyConfig, (first_s, last_s): (f64, f64)) -> Option<Rest> {
+fn standstill(
+    at_rest: &AtRest,
+    config: &IdentifyConfig,
+    (first_s, last_s): (f64, f64),
+) -> Option<Standstill> {
     let of_cell = at_rest.cell.filter(|(value, sigma)| {
         let agrees = |reading: &Reading| {
             (reading.mean - value).abs()
@@ -56,7 +60,7 @@ fn rest(at_rest: &AtRest, config: &IdentifyConfig, (first_s, last_s): (f64, f64)
     let readings = Readings {
         values: CHANNELS.map(value),
         run_ratio: ((end_s - first_s) / (last_s - first_s)).clamp(0.0, 1.0),
-        rest: config.rest,
+        exact_at: config.exact_at,
         air: config.air,
     };
     let count = others.len();
@@ -67,7 +71,7 @@ fn rest(at_rest: &AtRest, config: &IdentifyConfig, (first_s, last_s): (f64, f64)
     // Gas and wall have one temperature.
     let no_conduction =
         [Channel::T1, Channel::T2].map(|channel| (channel, FaultKind::TowardsWall, vec![0.0; count]));
-    Some(Rest {
+    Some(Standstill {
         rows: Rows {
             residual: others.iter().map(|other| other.value - first.value).collect(),
             covariance: own(others.iter().map(|other| other.sigma))
@@ -88,7 +92,7 @@ fn member(reading: &Reading, config: &IdentifyConfig) -> Member {
     let Reading { channel, mean, own, .. } = *reading;
     let declared = config.sensor(channel);
     let is_parameter = CHANNELS.contains(&channel) && declared.offset_sigma == offset_sigma(channel, config);
-    let gain = declared.gain_sigma_ratio * config.rest.gain_error(channel, mean);
+    let gain = declared.gain_sigma_ratio * config.exact_at.gain_error(channel, mean);
     let other = if is_parameter { 0.0 } else { offset_sigma(channel, config).hypot(gain) };
     Member { channel: Some(channel), value: mean, sigma: own.hypot(other) }
 }
@@ -101,11 +105,11 @@ fn offset_sigma(channel: Channel, config: &IdentifyConfig) -> f64 {
 }
 
 /// The first standstill in which a fault of this size moves a reading visibly.
-pub(crate) fn seen(rests: &[Rest], fault: &SensorFault, value: f64) -> Option<SeenAtRest> {
-    let shows = |rest: &&Rest| {
-        let effect = rest.rows.by_fault(fault);
-        let errors = rest.rows.covariance.diagonal();
+pub(crate) fn seen(standstills: &[Standstill], fault: &SensorFault, value: f64) -> Option<SeenAtRest> {
+    let shows = |at_rest: &&Standstill| {
+        let effect = at_rest.rows.by_fault(fault);
+        let errors = at_rest.rows.covariance.diagonal();
         effect.iter().zip(&errors).any(|(effect, error)| (effect * value).abs() > HINT_SIGMAS * error.sqrt())
     };
-    rests.iter().find(shows).map(|rest| rest.seen)
+    standstills.iter().find(shows).map(|at_rest| at_rest.seen)
 }

@@ -4,7 +4,7 @@ use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::{Code, Failure};
 use crate::output::standard_output;
-use crate::output::standard_output::Replace;
+use crate::output::standard_output::FileOutput;
 use clap::Args;
 use mapper_report::{Describe, corrected_csv};
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, Session, SessionError, Versioned};
@@ -22,11 +22,8 @@ pub struct Drift {
     /// Write the points corrected for drift to this new CSV file
     #[arg(long, value_name = "FILE")]
     pub corrected: Option<PathBuf>,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
     #[command(flatten)]
-    pub replace: Replace,
+    pub output: FileOutput,
 }
 
 impl Drift {
@@ -43,11 +40,11 @@ impl Drift {
         if let Some(path) = &self.corrected {
             let corrected =
                 corrected_csv(&drift.report).map_err(|error| Failure::new(Code::Failure, error))?;
-            self.replace.write(path, &corrected)?;
+            self.output.write(path, &corrected)?;
         }
         let warnings: Vec<String> =
             recorded.iter().flat_map(|recorded| &recorded.read.warnings).map(ToString::to_string).collect();
-        if self.json {
+        if self.output.json {
             let versioned = Versioned { format_version: DIAGNOSIS_FORMAT, content: &drift.report };
             let mut value = serde_json::to_value(versioned).map_err(SessionError::from)?;
             value["recordings"] = recorded.iter().map(|recorded| json!(recorded.path)).collect();

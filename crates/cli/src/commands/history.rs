@@ -2,7 +2,7 @@
 
 use crate::output::failure::Failure;
 use crate::output::standard_output;
-use crate::output::standard_output::Replace;
+use crate::output::standard_output::FileOutput;
 use clap::Args;
 use mapper_history::{Filter, Metric};
 use mapper_report::{history_svg, listed_runs, night_groups};
@@ -34,11 +34,8 @@ pub struct History {
     /// Draw the trends into this new SVG file
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
     #[command(flatten)]
-    pub replace: Replace,
+    pub output: FileOutput,
 }
 
 fn parse_metric(text: &str) -> Result<Metric, String> {
@@ -78,9 +75,9 @@ impl History {
             if self.figure.is_empty() { DEFAULT_METRICS.to_vec() } else { self.figure.clone() };
         if let Some(path) = &self.svg {
             let report_of = |started_ms| night_report_link(path, &self.db, started_ms);
-            self.replace.write(path, history_svg(&runs, &figures, report_of).as_bytes())?;
+            self.output.write(path, history_svg(&runs, &figures, report_of).as_bytes())?;
         }
-        if self.json {
+        if self.output.json {
             let runs: Vec<serde_json::Value> = runs.iter().map(mapper_report::listed_run_json).collect();
             return standard_output::print_json(&json!({"history": self.db, "runs": runs}));
         }

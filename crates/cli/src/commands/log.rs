@@ -4,7 +4,7 @@ use crate::command_line::{key_and_value, subcommands};
 use crate::environment::registry;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
-use crate::output::standard_output::Replace;
+use crate::output::standard_output::FileOutput;
 use clap::Args;
 use mapper_report::{log_contents, with_messages};
 use mapper_session::inspect_log;
@@ -41,11 +41,8 @@ pub struct Inspect {
     /// Write the proposed channel map to this new file
     #[arg(long, value_name = "FILE")]
     pub write_channels: Option<PathBuf>,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
     #[command(flatten)]
-    pub replace: Replace,
+    pub output: FileOutput,
 }
 
 impl Inspect {
@@ -53,9 +50,9 @@ impl Inspect {
         let registry = registry();
         let log = inspect_log(&registry, &self.log, self.with.clone(), self.machine.as_deref())?;
         if let Some(file) = &self.write_channels {
-            self.replace.write(file, log.channel_map().as_bytes())?;
+            self.output.write(file, log.channel_map().as_bytes())?;
         }
-        if self.json {
+        if self.output.json {
             return standard_output::print_json(&with_messages(|| log.json()));
         }
         let mut document = log_contents(log.format, &log.layout, &log.survey, &log.proposal);

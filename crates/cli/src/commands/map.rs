@@ -4,7 +4,7 @@ use crate::command_line::{MapReading, RecordingReading, reference, subcommands};
 use crate::environment::registry;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
-use crate::output::standard_output::{MapTarget, Replace};
+use crate::output::standard_output::{FileOutput, MapTarget};
 use clap::Args;
 use mapper_core::EfficiencyDefinition;
 use mapper_maps::MapFitOptions;
@@ -52,11 +52,8 @@ pub struct Compare {
     /// Draw both maps and their difference in this new file (.svg or .png)
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
     #[command(flatten)]
-    pub replace: Replace,
+    pub output: FileOutput,
 }
 
 impl Compare {
@@ -67,10 +64,10 @@ impl Compare {
             ..MapReading::default()
         };
         let (first, second) = (self.reading.description()?, of_second.description()?);
-        let picture = self.picture.as_deref().map(|path| (path, self.replace.existing()));
+        let picture = self.picture.as_deref().map(|path| (path, self.output.existing()));
         let maps = [(self.first.as_path(), &first), (self.second.as_path(), &second)];
         let work = registry().compare_map_files(maps, picture)?;
-        standard_output::print_map_work(&work, self.json)
+        standard_output::print_map_work(&work, self.output.json)
     }
 }
 
@@ -95,22 +92,19 @@ pub struct Convert {
     /// Definition of the efficiencies of the new file [default: unchanged]
     #[arg(long, value_name = "DEFINITION")]
     pub to_efficiency: Option<EfficiencyDefinition>,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
     #[command(flatten)]
-    pub replace: Replace,
+    pub output: FileOutput,
 }
 
 impl Convert {
     pub fn run(&self) -> Result<(), Failure> {
         let to_reference = reference(self.to_reference.as_deref())?;
-        let out = self.replace.map(&self.out, self.to.as_deref());
+        let out = self.output.map(&self.out, self.to.as_deref());
         let efficiencies = (self.efficiency, self.to_efficiency);
         let description = self.reading.description()?;
         let registry = registry();
         let work = registry.convert_map_file(&self.map, &description, out, to_reference, efficiencies)?;
-        standard_output::print_map_work(&work, self.json)
+        standard_output::print_map_work(&work, self.output.json)
     }
 }
 
@@ -143,7 +137,7 @@ impl Fit {
         };
         let description = self.reading.description()?;
         let work = registry().fit_map_file(&self.map, &description, &options, self.target.map())?;
-        standard_output::print_map_work(&work, self.target.json)
+        standard_output::print_map_work(&work, self.target.output.json)
     }
 }
 
@@ -160,16 +154,13 @@ pub struct Fmu {
     pub compile: bool,
     #[command(flatten)]
     pub reading: RecordingReading,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
     #[command(flatten)]
-    pub replace: Replace,
+    pub output: FileOutput,
 }
 
 impl Fmu {
     pub fn run(&self) -> Result<(), Failure> {
-        let (registry, existing) = (registry(), self.replace.existing());
+        let (registry, existing) = (registry(), self.output.existing());
         let session = Session::new(&registry);
         let nominal = self.machine.extension().is_some_and(|ending| ending == "yaml" || ending == "yml");
         let written = if nominal {
@@ -180,7 +171,7 @@ impl Fmu {
             let recorded = Recorded::read_run(&registry, &self.machine, &map, given.as_ref())?;
             session.identified_fmu(recorded, &map, self.compile, &self.out, existing)?
         };
-        if self.json {
+        if self.output.json {
             return standard_output::print_json(&written);
         }
         let library = written.binary.as_deref().unwrap_or("none; the importer compiles the sources");
@@ -203,18 +194,15 @@ pub struct Inspect {
     /// Write a map description, which later commands and campaigns accept, to this new file
     #[arg(long, value_name = "FILE")]
     pub write_description: Option<PathBuf>,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
     #[command(flatten)]
-    pub replace: Replace,
+    pub output: FileOutput,
 }
 
 impl Inspect {
     pub fn run(&self) -> Result<(), Failure> {
-        let description = self.write_description.as_deref().map(|file| (file, self.replace.existing()));
+        let description = self.write_description.as_deref().map(|file| (file, self.output.existing()));
         let work = registry().inspect_map_file(&self.map, &self.reading.description()?, description)?;
-        standard_output::print_map_work(&work, self.json)
+        standard_output::print_map_work(&work, self.output.json)
     }
 }
 
@@ -242,7 +230,7 @@ pub struct Reduce {
 impl Reduce {
     pub fn run(&self) -> Result<(), Failure> {
         let (description, target) = (self.reading.description()?, &self.target);
-        let budget = self.budget.as_deref().map(|file| (file, target.replace.existing()));
+        let budget = self.budget.as_deref().map(|file| (file, target.output.existing()));
         let machine = self.machine.as_deref();
         let registry = registry();
         let work = if self.turbine {
@@ -250,7 +238,7 @@ impl Reduce {
         } else {
             registry.reduce_points(&self.points, &description, machine, target.map(), budget)?
         };
-        standard_output::print_map_work(&work, target.json)
+        standard_output::print_map_work(&work, target.output.json)
     }
 }
 

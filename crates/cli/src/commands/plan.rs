@@ -4,7 +4,7 @@ use crate::environment::registry;
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
 use crate::output::standard_output;
-use crate::output::standard_output::Replace;
+use crate::output::standard_output::FileOutput;
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
@@ -23,9 +23,6 @@ use std::path::PathBuf;
 pub struct Plan {
     /// Campaign file (YAML)
     pub campaign: PathBuf,
-    /// Print the plan as one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
     /// Also store the plan in this new file, for `mapper run --plan`
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
@@ -45,7 +42,7 @@ pub struct Plan {
     #[arg(long, value_name = "FACTOR", hide_short_help = true)]
     pub effort: Option<f64>,
     #[command(flatten)]
-    pub replace: Replace,
+    pub output: FileOutput,
 }
 
 /// A point as `speed@opening`; the speed carries its unit.
@@ -76,7 +73,7 @@ impl Plan {
         let request = inputs.request(&campaign, &model);
         if let [from, to] = self.why.as_slice() {
             let jump = mapper_planner::explain_jump(&request, *from, *to).map_err(SessionError::from)?;
-            return if self.json {
+            return if self.output.json {
                 standard_output::print_json(&jump_json(&jump))
             } else {
                 standard_output::show(&jump_forecast(&campaign, &jump))
@@ -93,9 +90,9 @@ impl Plan {
             let request = PlanRequest { order: VisitOrder::SpeedLines, appended: None, ..request.clone() };
             // The limits may not allow this order.
             let speed_lines = make_plan(&request).ok();
-            self.replace.write(path, plan_svg(&campaign, &model, &plan, speed_lines.as_ref()).as_bytes())?;
+            self.output.write(path, plan_svg(&campaign, &model, &plan, speed_lines.as_ref()).as_bytes())?;
         }
-        if self.json {
+        if self.output.json {
             let mut value = plan_json(&campaign, &plan)?;
             if let Some(others) = &others {
                 value["comparison"] = comparison_json(&plan, others);
@@ -121,7 +118,7 @@ impl Plan {
         }
         let mapper_session::Rehearsal { plan, notes } = rehearse(session, campaign, model, source)?;
         self.store(&plan)?;
-        if self.json {
+        if self.output.json {
             let mut value = plan_json(campaign, &plan)?;
             value["forecast"] = true.into();
             value["notes"] = notes.into();
@@ -138,7 +135,7 @@ impl Plan {
 
     fn store(&self, plan: &StepPlan) -> Result<(), Failure> {
         let Some(path) = &self.out else { return Ok(()) };
-        Ok(self.replace.write(path, json_text(plan)?.as_bytes())?)
+        Ok(self.output.write(path, json_text(plan)?.as_bytes())?)
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::{Code, Failure};
-use crate::output::standard_output::Replace;
+use crate::output::standard_output::FileOutput;
 use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_recording::ChannelMap;
@@ -28,11 +28,8 @@ pub struct Report {
     /// Also print the page to a PDF next to it; needs Chromium on the path
     #[arg(long)]
     pub pdf: bool,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
     #[command(flatten)]
-    pub replace: Replace,
+    pub output: FileOutput,
 }
 
 impl Report {
@@ -43,7 +40,7 @@ impl Report {
         });
         // The page of a run directory is made from its recording, so it may be replaced.
         let is_own = self.out.is_none() && out.parent().is_some_and(|parent| !parent.as_os_str().is_empty());
-        let replace = Replace { force: self.replace.force || is_own };
+        let replace = FileOutput { json: self.output.json, force: self.output.force || is_own };
         replace.existing().check(&out)?;
         let (map, given) = self.reading.read()?;
         let registry = registry();
@@ -65,7 +62,7 @@ impl Report {
             files.push(("pdf", out.with_extension("pdf")));
             replace.write(&files[1].1, &pdf)?;
         }
-        if self.json {
+        if self.output.json {
             return standard_output::print_json(&files.into_iter().collect::<BTreeMap<_, _>>());
         }
         let line = |(what, path): &(&str, PathBuf)| format!("{what:<11}{}\n", path.display());

@@ -4,7 +4,7 @@ use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
-use crate::output::standard_output::Replace;
+use crate::output::standard_output::FileOutput;
 use clap::Args;
 use mapper_report::Describe;
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, Session, Side, Versioned, write_transient};
@@ -29,11 +29,8 @@ pub struct Transient {
     /// Write text, JSON and pictures to this directory
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
     #[command(flatten)]
-    pub replace: Replace,
+    pub output: FileOutput,
 }
 
 /// A time with its unit, s.
@@ -52,10 +49,10 @@ impl Transient {
             Session::new(&registry).transient(&recorded, &map, self.side, self.fit_until, &effects)?;
         let machine = recorded.campaign.as_ref().map_or("", |campaign| &campaign.machine.name);
         let files = match &self.out {
-            Some(directory) => write_transient(&diagnosis, machine, directory, self.replace.existing())?,
+            Some(directory) => write_transient(&diagnosis, machine, directory, self.output.existing())?,
             None => Vec::new(),
         };
-        if self.json {
+        if self.output.json {
             return standard_output::print_json(&Versioned {
                 format_version: DIAGNOSIS_FORMAT,
                 content: &diagnosis,

@@ -18,13 +18,16 @@ static PRINTED: AtomicBool = AtomicBool::new(false);
 
 /// Options of commands that write files.
 #[derive(Debug, Args)]
-pub struct Replace {
+pub struct FileOutput {
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
     /// Replace existing files
     #[arg(long)]
     pub force: bool,
 }
 
-impl Replace {
+impl FileOutput {
     /// Treatment of an existing file.
     pub fn existing(&self) -> Existing {
         if self.force { Existing::Replaced } else { Existing::Kept }
@@ -50,17 +53,14 @@ pub struct MapTarget {
     /// Format of `--out`
     #[arg(long, value_name = "FORMAT", requires = "out")]
     pub to: Option<String>,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
     #[command(flatten)]
-    pub replace: Replace,
+    pub output: FileOutput,
 }
 
 impl MapTarget {
     /// The file, if asked for.
     pub fn map(&self) -> Option<MapOut<'_>> {
-        self.out.as_deref().map(|out| self.replace.map(out, self.to.as_deref()))
+        self.out.as_deref().map(|out| self.output.map(out, self.to.as_deref()))
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::command_line::channel_map;
 use crate::environment::registry;
 use crate::output::failure::{Code, Failure};
-use crate::output::standard_output::Replace;
+use crate::output::standard_output::FileOutput;
 use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_diagnose::gap::ClosureTerm;
@@ -34,9 +34,6 @@ pub struct Diagnose {
     /// Also try a suspected effect written in rhai; may be repeated
     #[arg(long = "effect", value_name = "FILE")]
     pub effects: Vec<PathBuf>,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub json: bool,
     /// Write each closure term that is found as an effect in rhai into this directory
     #[arg(long, value_name = "DIR")]
     pub closure_terms: Option<PathBuf>,
@@ -44,13 +41,13 @@ pub struct Diagnose {
     #[arg(long, value_name = "OUT")]
     pub html: Option<PathBuf>,
     #[command(flatten)]
-    pub replace: Replace,
+    pub output: FileOutput,
 }
 
 impl Diagnose {
     /// Diagnoses one recording, or each of several.
     pub fn run(&self) -> Result<(), Failure> {
-        self.html.iter().try_for_each(|file| self.replace.existing().check(file))?;
+        self.html.iter().try_for_each(|file| self.output.existing().check(file))?;
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;
         let registry = registry();
@@ -81,17 +78,17 @@ impl Diagnose {
             self.write_closure_terms(&mut gap.diagnosed.diagnosis.closure_terms)?;
             if let Some(file) = &self.html {
                 let page = gap.page(&campaign.machine.name, title)?;
-                self.replace.write(file, page.as_bytes())?;
+                self.output.write(file, page.as_bytes())?;
             }
         }
         if let [(_, gap)] = &gaps[..] {
-            return if self.json {
+            return if self.output.json {
                 standard_output::print_json(&with_messages(|| gap.json())?)
             } else {
                 standard_output::show(&document(gap))
             };
         }
-        if self.json {
+        if self.output.json {
             let each: Result<Vec<Value>, Failure> = gaps
                 .iter()
                 .map(|(path, gap)| {
@@ -123,7 +120,7 @@ impl Diagnose {
                 (None, Some(page)) => page.with_extension(format!("closure_term_{}.rhai", place + 1)),
                 (None, None) => continue,
             };
-            self.replace.write(&file, script.as_bytes())?;
+            self.output.write(&file, script.as_bytes())?;
             term.rhai = Some(file.display().to_string());
         }
         Ok(())

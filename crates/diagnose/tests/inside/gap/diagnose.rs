@@ -59,6 +59,17 @@ fn a_run_in_real_time_is_late_and_its_rig_is_not_to_blame() {
     );
 }
 
+/// A second run of the same rig with other points.
+const NEXT: Visits = Visits { speeds_rpm: &[100e3, 65e3, 125e3, 85e3, 110e3], dwell_s: 60.0 };
+
+fn next_night(effects: &[(&str, &[f64])], seed: u64) -> Recording {
+    let mut rig = Rig::new(Model::nominal());
+    for (id, values) in effects {
+        add(&mut rig, mapper_effects::find(id).unwrap().as_ref(), values).unwrap();
+    }
+    common::record_of(&rig, &NEXT, seed)
+}
+
 /// With a few candidates only; `mapper gap blind` tests the search over all of them.
 fn ask(recording: &Recording) -> Result<Diagnosed, GapError> {
     ask_with(recording, None)

@@ -9,8 +9,10 @@ use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
 const BLADES: std::ops::RangeInclusive<usize> = 4..=16;
 /// Largest deviation of a ratio of speeds from one of numbers of blades. Bound: half the distance of neighbouring ratios, 8/9 and 9/10.
 const SAME_RATIO: f64 = 0.005;
-/// Largest spread of the ratios of a map, central four fifths. Bound: twice the tolerance of a map's flow, and the error of a flow meter.
+/// Largest spread of the ratios of a map between these quantiles. Bound: twice the tolerance of a map's flow, and the error of a flow meter.
 const MAX_SPREAD_RATIO: f64 = 0.02;
+/// Quantiles of that spread. Bound: a tenth of the points at each end may be wrong.
+const CENTRAL: [f64; 2] = [0.1, 0.9];
 /// Deviation of a measured speed from that of the grid. Bound: what a controller holds.
 const HELD_RATIO: f64 = 0.01;
 /// Share of points on the grid from which the grid is met, and below half of which it is not. Bound: by chance a fifth of the points is.
@@ -59,7 +61,8 @@ fn by_map(
         Some(speed_rpm / map_speed_rpm(map, flow_kg_s, point.pressure_ratio, speed_rpm)?)
     };
     let ratios: Vec<f64> = points.iter().filter_map(ratio).collect();
-    let spread = quantile(&ratios, 0.9)? - quantile(&ratios, 0.1)?;
+    let [low, high] = CENTRAL.map(|share| quantile(&ratios, share));
+    let spread = high? - low?;
     let middle = median(&ratios)?;
     let off = |count: &BladeCount| (middle / count.ratio() - 1.0).abs();
     let known = ratios.len() >= MIN_VALUES && spread < MAX_SPREAD_RATIO;

@@ -14,8 +14,7 @@
 //!    is beyond tolerance, the [smallest cause](gap::SmallestSeen) that would have been named.
 //!
 //! The result, [`gap::Diagnosed`], is the source of what follows: the [map without the causes](gap::Diagnosed::correct), the
-//! [calibrated model](gap::Found), which [`gap::ForecastCheck`] compares with a later recording, and causes over
-//! [several recordings](gap::Over).
+//! [calibrated model](gap::Found), which [`gap::ForecastCheck`] compares with a later recording.
 //!
 //! [`drift::diagnose`] answers which sensor or part changed between repeats, and [`driven::diagnose`] explains logs without steps, of which one side
 //! is driven by its measured neighbours.

@@ -7,6 +7,7 @@ use mapper_identify::{
     IdentifyConfig, NoZero, NotZeroed, Suspect, ZeroSettings, expected_after_zero, identify,
     identify_recording, isothermal_zero, zeroed,
 };
+use mapper_physics::rig::sensor_fault::ExactReadings;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -282,7 +283,7 @@ fn what_rests_is_zeroed_before_the_housing_does() {
     assert_eq!(after.series[&Channel::Tc], before);
     assert_eq!(left.declared[&Channel::Tc], config.declared[&Channel::Tc]);
     // The forecast expects the same.
-    let expected = expected_after_zero(config, &ZeroSettings::default(), 300.0, 100e3);
+    let expected = expected_after_zero(config, &ZeroSettings::default(), 300.0, ExactReadings::default());
     assert_eq!(expected.declared[&Channel::Tc].offset_sigma, 0.3);
     assert!(expected.declared[&Channel::T1].offset_sigma < 0.06, "{expected:?}");
     assert!(expected.thermometer_sigma_k > 0.0 && expected.barometer_sigma_pa > 0.0);

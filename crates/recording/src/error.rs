@@ -135,7 +135,7 @@ pub enum ReadWarning {
     )]
     MeasuredValve { turns_percent: f64 },
     #[error("{0}")]
-    StepsFound(StepsFound),
+    StepsFound(Box<StepsFound>),
     #[error(
         "{channel} is a gauge pressure, and the ambient pressure is not in the recording: it was left out"
     )]

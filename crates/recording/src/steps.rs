@@ -124,7 +124,10 @@ pub(crate) fn find_steps(
     let of_readings: Vec<f64> = measured.iter().filter(only_measured).map(|jump| jump.start_s).collect();
     // Start of each step, and the time at which its commands have reached their values.
     let mut jumps_s: Vec<(f64, f64)> = commanded.clone();
-    jumps_s.extend(of_readings.iter().map(|start_s| (*start_s, *start_s)));
+    // Both commands are the whole truth: what readings alone show then, such as the start from rest, is told and begins no step.
+    let is_complete = p3.is_some() && valve.is_some();
+    let further = of_readings.iter().filter(|_| !is_complete);
+    jumps_s.extend(further.map(|start_s| (*start_s, *start_s)));
     jumps_s.push((first_s, first_s));
     jumps_s.sort_by(|a, b| a.0.total_cmp(&b.0));
     let ends_s = jumps_s.iter().skip(1).map(|(start_s, _)| last_before_s(series, *start_s)).chain([last_s]);
@@ -149,7 +152,6 @@ pub(crate) fn find_steps(
     let unanswered =
         |commanded: &&(f64, f64)| is_searched && !measured.iter().any(|jump| is_same(jump, commanded));
     let unanswered: Vec<f64> = commanded.iter().filter(unanswered).map(|(start_s, _)| *start_s).collect();
-    let is_complete = p3.is_some() && valve.is_some();
     if !is_complete || !of_readings.is_empty() || !unanswered.is_empty() {
         let of_commands = [(Channel::P3Command, p3), (Channel::ValveCommand, valve)];
         let shown_by_commands = of_commands.into_iter().filter_map(|(channel, command)| {
@@ -164,12 +166,12 @@ pub(crate) fn find_steps(
         let shown_by_readings = channels.into_iter().map(|channel| {
             (channel, measured.iter().filter(|jump| jump.channels.contains(&channel)).count())
         });
-        warnings.push(ReadWarning::StepsFound(StepsFound {
+        warnings.push(ReadWarning::StepsFound(Box::new(StepsFound {
             count: drop_rest_steps(steps.clone(), series).len(),
             shown: shown_by_commands.chain(shown_by_readings).collect(),
             only_readings_s: if is_complete { of_readings } else { Vec::new() },
             only_commands_s: unanswered,
-        }));
+        })));
     }
     steps
 }

@@ -120,7 +120,7 @@ fn the_forecast_error_falls_with_the_dwell() {
     };
     let errors = ["dwell: 30 s ", "dwell: 60 s ", "dwell: 120 s "].map(error);
     // Where offsets and gains prevail, the functions that smooth a longer window leave a little more noise.
-    assert!(errors[1] < 0.9 * errors[0] && errors[2] < 1.05 * errors[1], "{errors:?}");
+    assert!(errors[1] < 0.9 * errors[0] && errors[2] < 1.06 * errors[1], "{errors:?}");
 }
 
 /// The shortest dwell that reaches the required error: a second less misses it in the same order. From some 65 s on offsets and gains prevail, and

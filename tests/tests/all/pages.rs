@@ -160,7 +160,7 @@ fn the_page_of_a_run_works_in_a_browser() {
     assert!(seen["paths"].as_u64() > seen["paths_without_contours"].as_u64(), "contours are drawn");
     assert_eq!([&seen["zoomed"], &seen["whole_again"]], [true, true], "the map is zoomed and whole again");
     assert_eq!(seen["chosen"], seen["clicked"], "a click on a point shows its transient");
-    assert_eq!(seen["step_plots"], 6);
+    assert_eq!(seen["step_plots"], 7, "T2 and Tc with their residuals, speed, flow and pressures");
     assert_eq!(seen["by_keyboard"], true);
     // The words at the pointer are those of the point that was clicked.
     let clicked: usize = seen["clicked"].as_str().unwrap().parse().unwrap();

@@ -53,12 +53,7 @@ impl Identify {
             let results = session.identify_into(recorded, &map, method, directory)?;
             return match self.json {
                 true => standard_output::print_json(&results),
-                false => standard_output::show(&results_text(
-                    &display,
-                    &results,
-                    FULL_COMMAND,
-                    self.shown,
-                )),
+                false => standard_output::show(&results_text(&display, &results, FULL_COMMAND, self.shown)),
             };
         }
         let identified = session.identify(recorded, &map, method)?;

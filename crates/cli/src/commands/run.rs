@@ -168,12 +168,7 @@ impl Run {
             (Err(error), None) => return Err(error.into()),
             (Ok(results), _) if !self.json => {
                 let full_command = format!("`mapper identify {} --full`", results.run.display());
-                standard_output::show(&results_text(
-                    &campaign.display,
-                    &results,
-                    &full_command,
-                    self.shown,
-                ))?;
+                standard_output::show(&results_text(&campaign.display, &results, &full_command, self.shown))?;
             }
             // Without results, only the reason for the stop matters.
             (Err(_), Some(_)) if !self.json => {}

@@ -460,14 +460,14 @@ fn add_common_error(config: &mut IdentifyConfig, channels: &[Channel], sigma: f6
     }
 }
 
-/// Predicts the remaining offset uncertainty after a zero of `soak_s` at this pressure.
+/// Predicts the remaining offset uncertainty after a zero of `soak_s` with these readings at rest.
 pub fn expected_after_zero(
     mut config: IdentifyConfig,
     settings: &ZeroSettings,
     soak_s: f64,
-    pressure_pa: f64,
+    rest: ExactReadings,
 ) -> IdentifyConfig {
-    config.exact_at.pressure_pa = pressure_pa;
+    config.exact_at = rest;
     let used_s = used_s(soak_s, settings);
     for group in groups(settings) {
         let mut members = Vec::new();

@@ -402,8 +402,6 @@ fn push_number(line: &mut Vec<u8>, value: f64) {
 
 #[cfg(test)]
 mod tests {
-    #![cfg(target_os = "linux")]
-
     use super::*;
 
     /// Linux has a device that is always full.

@@ -40,7 +40,7 @@ impl Run<'_, '_> {
         setpoints: Setpoints,
     ) -> Result<(), BackendError> {
         let control = self.protection.stand.zip(self.sent).and_then(|(stand, before)| {
-            TransitionControl::new(stand, before, setpoints, (step, self.at), self.now_s)
+            TransitionControl::new(&stand, before, setpoints, (step, self.at), self.now_s)
         });
         self.transition = None;
         self.arrival = self.protection.stand.map(|stand| Arrival {

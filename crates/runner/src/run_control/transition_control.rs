@@ -78,7 +78,7 @@ impl TransitionControl {
     /// The transition to `to`, the setpoints of `step`, on its planned ramps if it starts at `at`, the current point. `None` if nothing changes, or
     /// if the machine does not run.
     pub(crate) fn new(
-        stand: StandMotion,
+        stand: &StandMotion,
         from: Setpoints,
         to: Setpoints,
         (step, at): (&PlanStep, Option<OperatingPoint>),
@@ -101,7 +101,7 @@ impl TransitionControl {
         let ramps = Ramps { p3: Ramp { duration_s: p3_s, ..ramps.p3 }, ..ramps };
         let target_rpm = step.to.speed_rpm;
         Some(TransitionControl {
-            stand,
+            stand: *stand,
             from,
             to,
             ramps,
@@ -382,7 +382,7 @@ mod tests {
         let (from, to) = (point(150e3, 0.5), point(50e3, 2.5));
         let (start, end) = (setpoints(300e3, 0.5), setpoints(130e3, 2.5));
         let plan = step(from, to, 130e3);
-        let mut control = TransitionControl::new(FAST, start, end, (&plan, Some(from)), 0.0).unwrap();
+        let mut control = TransitionControl::new(&FAST, start, end, (&plan, Some(from)), 0.0).unwrap();
         let (mut p3_pa, mut complete_s) = (300e3, f64::INFINITY);
         for tick in 1..=600 {
             let t_s = 0.1 * f64::from(tick);
@@ -406,7 +406,7 @@ mod tests {
         let (from, to) = (point(100e3, 2.5), point(150e3, 0.5));
         let (start, end) = (setpoints(160e3, 2.5), setpoints(300e3, 0.5));
         let plan = step(from, to, 300e3);
-        let mut control = TransitionControl::new(FAST, start, end, (&plan, Some(from)), 0.0).unwrap();
+        let mut control = TransitionControl::new(&FAST, start, end, (&plan, Some(from)), 0.0).unwrap();
         let (mut speed_rpm, mut highest_rpm) = (100e3, 0.0f64);
         let mut sent = start;
         for tick in 1..=200 {

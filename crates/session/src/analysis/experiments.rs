@@ -1,7 +1,7 @@
 //! Experiments that can distinguish causes: the planner's jumps, accepted steps of T3 and oil temperature, and a soak.
 
 use crate::plan::planning::PlanInputs;
-use crate::recording::identification_config::identification_with;
+use crate::recording::identification_config::{expected_rest, identification_with};
 use crate::{Registry, SessionError};
 use mapper_campaign::Campaign;
 use mapper_core::{OperatingPoint, RigMode, SetpointRanges, Setpoints};
@@ -50,7 +50,7 @@ fn soak(campaign: &Campaign, map: &ChannelMap) -> Option<Experiment> {
     }
     let settings = ZeroSettings::default();
     let residual_sigma =
-        expected_after_zero(identification_with(campaign, map), &settings, SOAK_S, campaign.boundary.p1_pa)
+        expected_after_zero(identification_with(campaign, map), &settings, SOAK_S, expected_rest(campaign))
             .declared;
     let offset_sigma_k = |channel| {
         residual_sigma

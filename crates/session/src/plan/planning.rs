@@ -3,7 +3,7 @@
 
 use crate::SessionError;
 use crate::recording::files::read_at_most;
-use crate::recording::identification_config::{declared, identification};
+use crate::recording::identification_config::{declared, expected_rest, identification};
 use crate::recording::journal::both_known_and_differ;
 use mapper_campaign::Campaign;
 use mapper_core::{
@@ -131,7 +131,7 @@ fn identification_after_zero(campaign: &Campaign) -> IdentifyConfig {
     let config = identification(campaign);
     match campaign.zero {
         Some(soak) => {
-            expected_after_zero(config, &ZeroSettings::from(soak), soak.duration_s, campaign.boundary.p1_pa)
+            expected_after_zero(config, &ZeroSettings::from(soak), soak.duration_s, expected_rest(campaign))
         }
         None => config,
     }
@@ -150,7 +150,7 @@ fn zero_remark(campaign: &Campaign) -> Option<PlanRemark> {
     let left_after = |soak_s: f64| -> BTreeMap<Channel, f64> {
         let settings = ZeroSettings::from(soak);
         let expected_sigma =
-            expected_after_zero(identification(campaign), &settings, soak_s, campaign.boundary.p1_pa)
+            expected_after_zero(identification(campaign), &settings, soak_s, expected_rest(campaign))
                 .declared;
         CHANNELS
             .into_iter()

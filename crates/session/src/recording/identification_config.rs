@@ -13,8 +13,14 @@ use mapper_identify::{Allowance, Housing, IdentifyConfig, PressureTap};
 use mapper_numerics::statistics::range;
 use mapper_observe::declared_uncertainties;
 use mapper_physics::gas::air::Air;
+use mapper_physics::rig::sensor_fault::ExactReadings;
 use mapper_recording::{AmbientPressure, ChannelMap, MachineConstants};
 use std::collections::BTreeMap;
+
+/// Readings that a zero is expected to have.
+pub(crate) fn expected_rest(campaign: &Campaign) -> ExactReadings {
+    ExactReadings { pressure_pa: campaign.boundary.p1_pa, temperature_k: campaign.boundary.t1_k }
+}
 
 /// Identification settings for the recordings of this campaign.
 pub fn identification(campaign: &Campaign) -> IdentifyConfig {

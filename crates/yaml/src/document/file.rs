@@ -111,12 +111,11 @@ pub fn open(
 
 #[cfg(test)]
 mod tests {
-    #![cfg(target_os = "linux")]
-
     use super::*;
     use std::path::PathBuf;
 
     /// Kernel files that wait for data look like plain ones; only root may open this one.
+    #[cfg(target_os = "linux")]
     #[test]
     fn what_may_hang_or_has_no_end_is_not_opened() {
         let folder = tempfile::tempdir().unwrap();

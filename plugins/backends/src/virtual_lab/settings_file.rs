@@ -444,8 +444,7 @@ mod tests {
     #[test]
     fn an_effect_in_rhai_is_named_by_its_file() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/effects/bearing_friction.rhai");
-        let lab =
-            read_settings(&json!({"effects": {file: {"c": "1.5e-6 W s2/rad2"}}}), &nominal()).unwrap();
+        let lab = read_settings(&json!({"effects": {file: {"c": "1.5e-6 W s2/rad2"}}}), &nominal()).unwrap();
         let state = State::new(rad_s_of_rpm(110e3), 155e3, 340.0, 500.0, 370.0);
         let balance_w = |model: &Model| {
             let model = model.prepare(&BoundaryConditions { p3_pa: 165e3, ..BoundaryConditions::default() });

@@ -8,9 +8,7 @@ use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_diagnose::gap::ClosureTerm;
 use mapper_report::{Describe, Document, headline, with_messages};
-use mapper_session::{
-    DIAGNOSIS_FORMAT, Gap, Recorded, Session, SessionEvent, check_all_distinct,
-};
+use mapper_session::{DIAGNOSIS_FORMAT, Gap, Recorded, Session, SessionEvent, check_all_distinct};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 

@@ -271,7 +271,7 @@ another build.
 The 48 points of `campaigns/turbo_a.yaml` on the virtual lab, {seeds} seeds a class, each with its own plan, noise and offsets, identified by `joint`. The class is
 the undeclared property of the machine: alpha_A; a T2 probe; the ratio of cooling to heating; mix 1: alpha_A 0.05, ratio 0.9, probe 0.7 mm;
 mix 2: alpha_A 0.08, ratio 0.93; mix 3: alpha_A 0.04, probe 1 mm; an inner wall with its share of the capacity and its conductance; P3 with a lag of 3 s and
-20 kPa/s beside a valve of 1 s and 0.2 1/s; the laboratories of other equations; what is efficiency for every method; sensors that are not as declared, planted
+20 kPa/s with a valve of 1 s and 0.2 1/s; the laboratories of other equations; what is efficiency for every method; sensors that are not as declared, planted
 as scripts. The bent map falls by 6 points more towards low speed; the other housing is heavier and has another law of convection and a tenth of its area
 before the wheel, all declared. With alpha_A, every odd seed has an undeclared law of h before the wheel. "Lines" follows speed lines.
 

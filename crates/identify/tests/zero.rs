@@ -136,7 +136,7 @@ fn with_rest_behind(recording: &Recording, soak_s: f64) -> Recording {
     rested
 }
 
-/// Five sensors beside a barometer, a cell's thermometer and cold oil: one that is ten of its declared offsets off at rest is named, before the
+/// Five sensors next to a barometer, a cell's thermometer and cold oil: one that is ten of its declared offsets off at rest is named, before the
 /// run or behind it, and its points are doubtful. Sensors as declared are not named in any of forty recordings.
 #[test]
 fn a_sensor_that_reads_another_value_at_rest_is_named_and_no_sound_one() {

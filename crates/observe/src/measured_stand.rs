@@ -5,13 +5,14 @@ use crate::averages::Table;
 use crate::model_inputs::lagged_command::{Path, Response, Search, estimate_response, valve_areas_m2};
 use mapper_core::unit_factors::{PA_PER_KPA, PERCENT};
 use mapper_core::{Channel, Recording, RigActuators, StepMarker, is_same_command};
+use mapper_numerics::least_squares::descent::{
+    DifferenceStep, Model, Normal, Until, descend, step_bounds_within,
+};
 use mapper_numerics::root::bisect;
-use mapper_numerics::statistics::{mean, student_quantile};
+use mapper_numerics::statistics::{NORMAL_975, mean, student_quantile};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-/// Standard deviations of a 95 % interval. Source: normal distribution.
-const SIGMAS_95: f64 = 1.96;
 /// Reduction of the cost above which a limited rate is accepted. Bound: three standard deviations; the interval covers what is missed.
 const MIN_COST_REDUCTION: f64 = 10.0;
 /// Rates of the coarse search, in median jumps per second. Bound: from a motion over half a minute to a lag alone; a rate shows only up to the
@@ -24,14 +25,8 @@ const RATES: [f64; 19] = [
 const BEFORE_S: f64 = 3.0;
 /// Size of a change of the command relative to the largest, from which it is a jump. Bound: smaller ones add little.
 const JUMP_SHARE: f64 = 0.3;
-/// Maximum number of iterations of a fit. Bound: it starts near the minimum, and each halves the distance at least.
-const MAX_ITERATIONS: usize = 12;
-/// Relative decrease of the cost below which a fit has converged. Bound: far below the scatter of the cost.
-const CONVERGED_RATIO: f64 = 1e-7;
-/// Distance of finite differences: s for times, in the logarithm of the rate. Bound: a tenth of a sample interval.
-const DIFFERENCE: f64 = 5e-3;
-/// Smallest share of a shortened step. Bound: a shorter one is no progress.
-const MIN_STEP_SHARE: f64 = 1e-2;
+/// Resolution of the slowest rate, in its logarithm. Bound: half a per cent is far below the width of its interval.
+const LN_RATE_RESOLUTION: f64 = 5e-3;
 /// Range of rates that are searched for the slowest possible one, in largest jumps per second. Bound: slower ones are no jumps.
 const SLOWEST_RATE: f64 = 1e-3;
 /// Longest distance over which the residuals are correlated, samples. Bound: noise of sensors is correlated over a few seconds.
@@ -230,49 +225,18 @@ impl<'a> Jumps<'a> {
         DVector::from_vec(all)
     }
 
-    /// The best parameters near `start`; `rate`: that of the response, unless it is a parameter.
+    /// The best parameters near `start`, in the order of [`response_at`].
     fn converge(&self, start: DVector<f64>, drive: Response) -> Option<Converged> {
-        let residuals_at = |parameters: &DVector<f64>| self.residuals(response_at(parameters, drive));
-        let mut parameters = start;
-        let mut residuals = residuals_at(&parameters);
-        let mut slopes = DMatrix::zeros(residuals.len(), parameters.len());
-        for _ in 0..MAX_ITERATIONS {
-            for index in 0..parameters.len() {
-                let mut moved = parameters.clone();
-                moved[index] += DIFFERENCE;
-                slopes.set_column(index, &((residuals_at(&moved) - &residuals) / DIFFERENCE));
-            }
-            let normal = slopes.transpose() * &slopes;
-            let Some(step) = normal.cholesky().map(|factor| factor.solve(&(slopes.transpose() * &residuals)))
-            else {
-                break;
-            };
-            let cost = residuals.norm_squared();
-            let mut share = 1.0;
-            let better = loop {
-                let mut moved = &parameters - &step * share;
-                moved[0] = moved[0].max(0.0);
-                let there = residuals_at(&moved);
-                if there.norm_squared() < cost {
-                    break Some((moved, there));
-                }
-                share *= 0.5;
-                if share < MIN_STEP_SHARE {
-                    break None;
-                }
-            };
-            let Some((moved, there)) = better else { break };
-            let has_converged = cost - there.norm_squared() < CONVERGED_RATIO * cost;
-            (parameters, residuals) = (moved, there);
-            if has_converged {
-                break;
-            }
-        }
-        let free = residuals.len().checked_sub(parameters.len() + self.starts_s.len())?.max(1);
-        let cost = residuals.norm_squared();
-        let variance = cost / free as f64 * correlation(&residuals);
-        let covariance = (slopes.transpose() * &slopes).try_inverse()? * variance;
-        Some(Converged { parameters, covariance, cost, variance })
+        let residuals = self.residuals(response_at(&start, drive));
+        let free = residuals.len().checked_sub(start.len() + self.starts_s.len())?.max(1) as f64;
+        // In standard deviations of what the start leaves, as the stopping rule expects.
+        let unit = (residuals.norm_squared() / free).sqrt().max(f64::MIN_POSITIVE);
+        let mut fit = ResponseFit { jumps: self, drive, unit };
+        let end = descend(&mut fit, start, residuals / unit, Until::default());
+        let cost = unit * unit * end.point.norm_squared();
+        let variance = cost / free * correlation(&end.point);
+        let covariance = end.normal.covariance_from(0)? * (variance / (unit * unit));
+        Some(Converged { parameters: end.unknowns, covariance, cost, variance })
     }
 
     fn fit(&self, drive: Response) -> Option<Motion> {
@@ -296,12 +260,12 @@ impl<'a> Jumps<'a> {
         let best = limited.flatten().filter(is_shown).unwrap_or(free);
         // A command takes effect between two samples.
         let half_width = |index: usize| {
-            (SIGMAS_95 * best.covariance[(index, index)].sqrt()).hypot(0.5 * self.table.interval_s)
+            (NORMAL_975 * best.covariance[(index, index)].sqrt()).hypot(0.5 * self.table.interval_s)
         };
         let mut lag_s = Fitted::of_time(best.parameters[0], half_width(0));
         let rate_per_s = match best.parameters.get(2) {
             Some(ln_rate) => {
-                let factor = (SIGMAS_95 * best.covariance[(2, 2)].sqrt()).exp();
+                let factor = (NORMAL_975 * best.covariance[(2, 2)].sqrt()).exp();
                 let value = ln_rate.exp();
                 Fitted { value, low: value / factor, high: value * factor }
             }
@@ -320,11 +284,48 @@ impl<'a> Jumps<'a> {
         let at = |ln_rate: f64| {
             self.converge(best.parameters.clone(), Response { slew_per_s: ln_rate.exp(), ..drive })
         };
-        let most = best.cost + SIGMAS_95 * SIGMAS_95 * best.variance;
+        let most = best.cost + NORMAL_975 * NORMAL_975 * best.variance;
         let is_excluded = |ln_rate: f64| at(ln_rate).is_none_or(|fit| fit.cost > most);
         let fastest = (size / best.parameters[0].max(self.table.interval_s)).ln();
-        let (_, ln_rate) = bisect((SLOWEST_RATE * size).ln(), fastest, DIFFERENCE, is_excluded);
+        let (_, ln_rate) = bisect((SLOWEST_RATE * size).ln(), fastest, LN_RATE_RESOLUTION, is_excluded);
         Some((ln_rate.exp(), at(ln_rate)?.parameters[0]))
+    }
+}
+
+/// The fit of one response to all jumps.
+struct ResponseFit<'j, 'a> {
+    jumps: &'j Jumps<'a>,
+    drive: Response,
+    /// Unit of the residuals, in that of the readings.
+    unit: f64,
+}
+
+impl Model for ResponseFit<'_, '_> {
+    type Point = DVector<f64>;
+
+    fn at(&self, unknowns: &DVector<f64>) -> Option<DVector<f64>> {
+        Some(self.jumps.residuals(response_at(unknowns, self.drive)) / self.unit)
+    }
+
+    fn cost(&self, _: &DVector<f64>, residuals: &DVector<f64>) -> f64 {
+        residuals.norm_squared()
+    }
+
+    fn normal(&mut self, unknowns: &DVector<f64>, residuals: &DVector<f64>, reach: DifferenceStep) -> Normal {
+        let slope = |index: usize| {
+            let mut moved = unknowns.clone();
+            moved[index] += reach.distance();
+            let there = self.jumps.residuals(response_at(&moved, self.drive)) / self.unit;
+            (there - residuals) / reach.distance()
+        };
+        let slopes = DMatrix::from_columns(&(0..unknowns.len()).map(slope).collect::<Vec<_>>());
+        Normal { matrix: slopes.tr_mul(&slopes), gradient: -slopes.tr_mul(residuals) }
+    }
+
+    fn step_bounds(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)> {
+        let low = |index: usize| if index == 0 { 0.0 } else { f64::NEG_INFINITY };
+        let bounds = unknowns.iter().enumerate();
+        bounds.map(|(index, at)| step_bounds_within(low(index), f64::INFINITY, *at)).collect()
     }
 }
 

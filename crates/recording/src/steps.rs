@@ -92,7 +92,7 @@ pub(crate) fn steps_from_markers(
 /// over three seconds, two apart, show it.
 const SAME_JUMP_S: f64 = 5.0;
 
-/// Fewest channels by which readings show a jump beside recorded commands. Bound: a single reading may be at fault.
+/// Minimum number of channels in which a jump shows that no recorded command has. Bound: a single reading may be at fault.
 const FEWEST_SHOWING: usize = 2;
 
 /// Steps from jumps of the `commands` that mark steps and of the readings: each lasts from one jump to the next. The time before the first jump
@@ -124,7 +124,7 @@ pub(crate) fn find_steps(
     let of_readings: Vec<f64> = measured.iter().filter(only_measured).map(|jump| jump.start_s).collect();
     // Start of each step, and the time at which its commands have reached their values.
     let mut jumps_s: Vec<(f64, f64)> = commanded.clone();
-    // Both commands are the whole truth: what readings alone show then, such as the start from rest, is told and begins no step.
+    // With both commands recorded, a jump of the readings alone, such as the start from standstill, is reported but begins no step.
     let is_complete = p3.is_some() && valve.is_some();
     let further = of_readings.iter().filter(|_| !is_complete);
     jumps_s.extend(further.map(|start_s| (*start_s, *start_s)));

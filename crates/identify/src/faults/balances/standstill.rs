@@ -97,7 +97,7 @@ fn member(reading: &Reading, config: &IdentifyConfig) -> Member {
     Member { channel: Some(channel), value: mean, sigma: own.hypot(other) }
 }
 
-/// The declared offset, before a zero: what differs from a zero by less is no fault. Without a declaration that of a usual sensor.
+/// The declared offset, before a zero: a smaller difference is not a fault. Without a declaration, that of a usual sensor.
 fn offset_sigma(channel: Channel, config: &IdentifyConfig) -> f64 {
     let declared = config.offsets_before_zero.get(&channel).copied();
     let declared = declared.unwrap_or_else(|| config.sensor(channel).offset_sigma);

@@ -43,7 +43,7 @@ MACHINES = {
     "other housing": OTHER_HOUSING,
     "alpha_A 0.12": [("virtual_lab: {}", "virtual_lab: {machine: {alpha_area: 0.12}}")],
 }
-ORDERS = ["thermal_gradient", "min_gradient", "speed_lines", "conventional"]
+ORDERS = ["thermal_gradient", "speed_lines", "conventional"]
 # Other ways to map, on turbo_a alone.
 WITHOUT_ZERO, DYNAMIC, ADIABATIC = "thermal_gradient, no zero", "thermal_gradient, dynamic, 120 s", "adiabatic"
 WAYS = [WITHOUT_ZERO, DYNAMIC, ADIABATIC]

@@ -191,7 +191,7 @@ pub(crate) struct CampaignFile {
     zero: Option<ZeroFile>,
     /// Method that identifies efficiency and heat-transfer coefficient.
     identification: Option<IdentificationFile>,
-    /// Order of the points. `thermal_gradient`, the default, maximises the sum of the housing's temperature changes (Burke et al., figure 13 b), `min_gradient` the smallest of them; `speed_lines` follows speed lines (figure 13 a), `conventional` too, and holds each point until it no longer drifts; `listed` keeps the order of the grid.
+    /// Order of the points. `thermal_gradient`, the default, maximises the sum of the housing's temperature changes (Burke et al., figure 13 b); `speed_lines` follows speed lines (figure 13 a), `conventional` too, and holds each point until it no longer drifts; `listed` keeps the order of the grid.
     #[serde(default)]
     order: VisitOrder,
     /// A rhai script that chooses the next step, in place of `order`: a `.rhai` file, relative to the campaign file. docs/reference/sequences.md lists its functions.

@@ -134,7 +134,8 @@ fn one_key_sets_the_dwell() {
 fn removed_keys_name_their_replacement() {
     for (order, remedy) in [
         ("sum_gradient", "thermal_gradient"),
-        ("worst_gradient", "min_gradient"),
+        ("worst_gradient", "speed_lines"),
+        ("min_gradient", "`listed`"),
         ("information", "thermal_gradient"),
         ("time", "required_sigma_eta"),
         ("best", "--compare"),
@@ -163,7 +164,7 @@ fn orders_and_repeats_fit_the_rest() {
     );
     let findings = mistakes(&text);
     assert!(findings.to_string().contains("ends where it starts"), "{findings}");
-    let (text, _) = with("campaign: short\n", "campaign: short\nrepeats: off\norder: min_gradient\n");
+    let (text, _) = with("campaign: short\n", "campaign: short\nrepeats: off\norder: listed\n");
     assert_eq!(run(&text).unwrap_or_else(|findings| panic!("{findings}")).repeats, None);
     // Silence switches nothing off.
     let silent = run(RIGHT).unwrap_or_else(|findings| panic!("{findings}")).repeats.unwrap();
@@ -450,7 +451,7 @@ fn types_and_names() {
         "campaign: short\norder: lsited\n",
         Kind::WrongValue,
         "lsited",
-        "not one of thermal_gradient, min_gradient, speed_lines, listed, conventional",
+        "not one of thermal_gradient, speed_lines, listed, conventional",
         "did you mean `listed`?",
     );
     one(

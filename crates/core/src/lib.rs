@@ -89,10 +89,8 @@ pub use rig::guard::{
 };
 pub use rig::limits::{Limits, OnDrift, SURGE_ALLOWED_S, Soak, SpeedControlSettings, SpeedResponse};
 pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeNotFound, SurgeSearchSettings};
-pub use test_plan::plan::{Plan, PlanBound, PlanFigures, PlanInputHashes, PlanStep, Predicted, StepKind};
-pub use test_plan::plan_remark::{
-    Advice, CampaignChange, NoBound, PlanRemark, UndeclaredForecast, VerdictForecast,
-};
+pub use test_plan::plan::{Plan, PlanFigures, PlanInputHashes, PlanStep, Predicted, StepKind};
+pub use test_plan::plan_remark::{Advice, CampaignChange, PlanRemark, UndeclaredForecast, VerdictForecast};
 pub use test_plan::points::{Dwell, Jump, OperatingPoint, Repeats, Timing, VisitOrder};
 pub use test_plan::step_number::step_number;
 pub use test_plan::transition::{Ramp, Ramps, Transition};

@@ -12,7 +12,7 @@ use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::steady;
 use mapper_planner::housing::{Chain, gradients_k};
-use mapper_planner::{Effort, Objective, search};
+use mapper_planner::{Effort, search};
 use std::time::Instant;
 
 /// Weights row after row, and the number of rows.
@@ -75,7 +75,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let chain = Fixed(weights, count);
     let given: Vec<usize> = (0..count).collect();
     let started = Instant::now();
-    let order = search(&chain, &given, Objective::Sum, Effort::usual(count, 1.0), seed).swap_remove(0);
+    let order = search(&chain, &given, Effort::usual(count, 1.0), seed).swap_remove(0);
     let seconds = started.elapsed().as_secs_f64();
     let sum_k: f64 = gradients_k(&chain, &order).iter().sum();
     let rows: Vec<&[f64]> = chain.0.chunks(count).collect();

@@ -85,6 +85,30 @@ pub fn gradients_k<C: Chain>(chain: &C, order: &[usize]) -> Vec<f64> {
     gradients
 }
 
+/// Penalty of a forbidden step, K: no order can compensate for it.
+pub(crate) const FORBIDDEN_PENALTY_K: f64 = 1e6;
+
+/// Value of one step for the search, K: its gradient, minus the penalty if it is forbidden.
+#[inline]
+pub(crate) fn value_k<C: Chain>(chain: &C, from: usize, to: usize, gradient_k: f64) -> f64 {
+    let size_k = gradient_k.abs();
+    let is_forbidden = size_k > chain.gradient_max_k() || !chain.admissible(from, to);
+    if is_forbidden { size_k - FORBIDDEN_PENALTY_K } else { size_k }
+}
+
+/// Sum of the values of an order, K.
+pub(crate) fn sum_k<C: Chain>(chain: &C, order: &[usize]) -> f64 {
+    let Some(&first) = order.first() else { return 0.0 };
+    let (mut state, mut sum_k) = (chain.first(first), 0.0);
+    let jumps = order.windows(2).map(|pair| (pair[0], pair[1])).chain(return_jump(chain, order));
+    for (from, to) in jumps {
+        let (gradient_k, next) = chain.step(from, to, state);
+        sum_k += value_k(chain, from, to, gradient_k);
+        state = next;
+    }
+    sum_k
+}
+
 /// Housing temperatures that differ by less, K, lead to later gradients that no sensor can distinguish.
 const INDISTINGUISHABLE_K: f64 = 0.01;
 
@@ -114,20 +138,6 @@ impl Surface {
         let slope = (0..3).map(|i| (squares[i] - mean_x) * (even[i] - mean_y)).sum::<f64>()
             / squares.iter().map(|x| (x - mean_x).powi(2)).sum::<f64>();
         Surface([mean_y - slope * mean_x, k1, k2, k3, slope])
-    }
-
-    /// Minimum and maximum over a box of c and t at one w.
-    pub(crate) fn range(&self, c: (f64, f64), t: (f64, f64), w: f64) -> (f64, f64) {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        let vertex = -self.0[1] / (2.0 * self.0[4]);
-        let vertex_inside = (vertex > c.0 && vertex < c.1).then_some(vertex);
-        for c in [Some(c.0), Some(c.1), vertex_inside].into_iter().flatten() {
-            for t in [t.0, t.1] {
-                let value = self.at(c, t, w);
-                (low, high) = (low.min(value), high.max(value));
-            }
-        }
-        (low, high)
     }
 }
 
@@ -160,12 +170,6 @@ pub(crate) struct Response {
     /// State after the first step of a campaign, scaled.
     first: [f64; 2],
 }
-
-/// Minimum and maximum.
-pub(crate) type Interval = (f64, f64);
-
-/// Range of the scaled Tc and Tt at the end of a dwell.
-pub(crate) type StateBox = (Interval, Interval);
 
 /// The reduced model of all points.
 #[derive(Debug, Clone)]
@@ -234,11 +238,6 @@ impl Housing {
     /// Forbids the jump between two points.
     pub(crate) fn forbid(&mut self, from: usize, to: usize) {
         self.forbidden.insert((from, to));
-    }
-
-    /// Largest allowed gradient, K.
-    pub(crate) fn gradient_max_k(&self) -> f64 {
-        self.gradient_max_k
     }
 }
 

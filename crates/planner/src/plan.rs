@@ -198,7 +198,6 @@ pub fn plan_other_orders(request: &PlanRequest<'_>, plan: &Plan) -> Result<Vec<P
             repeats: request.repeats.filter(|_| !conventional),
             return_to_first: request.return_to_first && !conventional,
             appended: None,
-            bound: false,
             ..request.clone()
         })
     };

@@ -1,24 +1,22 @@
-//! Builds a plan for a given dwell: order, repeats, ways around forbidden jumps, figures, bound and remarks.
+//! Builds a plan for a given dwell: order, repeats, ways around forbidden jumps, figures and remarks.
 
-use crate::bound::GradientBounds;
 use crate::forecast::ParameterError;
-use crate::housing::{Housing, RepeatedJump, gradients_k};
+use crate::housing::{Housing, RepeatedJump};
 use crate::jump_forecast::forecast_jumps;
 use crate::jump_graph::{JumpGraph, Rejection};
-use crate::order::{PROOF_TOLERANCE_RATIO, PointOrder, objective, search_orders};
 use crate::request::hash_inputs;
 use crate::request::{PlanError, PlanRequest, solve_steady_states};
+use crate::search::search_orders;
 use crate::visits::{
     Visit, append_jump, append_return, insert_repeats, repeat_count, value, visits_of_points,
 };
 use crate::walk::{ForbiddenJump, Walk, walk};
 use mapper_core::{
-    Dwell, Jump, NoBound, OperatingPoint, Plan, PlanBound, PlanFigures, PlanRemark, PlanStep, Predicted,
-    Repeats, StepKind, VisitOrder,
+    Dwell, Jump, OperatingPoint, Plan, PlanFigures, PlanRemark, PlanStep, Predicted, Repeats, StepKind,
+    VisitOrder,
 };
 use mapper_numerics::statistics::rms;
 use mapper_physics::simulation::steady::SteadyState;
-use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::mem::discriminant;
 
@@ -96,13 +94,10 @@ struct WayAround {
 pub(crate) struct Draft {
     /// Dwell of each step, s; the minimum dwell in conventional mapping.
     pub(crate) dwell_s: f64,
-    ordered: PointOrder,
     visits: Vec<Visit>,
     ways_around: Vec<WayAround>,
     steps: Vec<PlanStep>,
     parameter_error: Option<ParameterError>,
-    /// The reduced housing on which the order was searched; `None` if it was made for another dwell.
-    housing: Option<Housing>,
 }
 
 impl Draft {
@@ -162,22 +157,11 @@ impl<'a> PlanBuilder<'a> {
             let effort = if round == 0 { request.effort } else { REORDER_EFFORT_RATIO * request.effort };
             let orders =
                 search_orders(&housing, &self.points, &given, &PlanRequest { effort, ..request.clone() });
-            let Some((ordered, visits, returned)) = self.best_of(&housing, orders) else { break };
+            let Some((order, visits)) = self.best_of(&housing, orders) else { break };
             let Walk { steps, forbidden, parameter_error } =
                 walk(request, &self.points, &self.targets, &visits, dwell_s)?;
             if forbidden.is_empty() {
-                // The proof covers an order with its return: without the return it does not apply.
-                let proven = ordered.proven && (returned || !request.return_to_first || given.len() < 2);
-                let ordered = PointOrder { proven, ..ordered };
-                return Ok(Draft {
-                    dwell_s,
-                    ordered,
-                    visits,
-                    ways_around: Vec::new(),
-                    steps,
-                    parameter_error,
-                    housing: Some(housing),
-                });
+                return Ok(Draft { dwell_s, visits, ways_around: Vec::new(), steps, parameter_error });
             }
             let before = forbidden_jumps.len();
             for ForbiddenJump { from, to, reasons } in forbidden {
@@ -186,8 +170,8 @@ impl<'a> PlanBuilder<'a> {
                 let jump = Jump { from: self.points[from], to: self.points[to] };
                 reasons.into_iter().for_each(|reason| keep_worst(&mut worst, jump, reason));
             }
-            given = ordered.order;
-            if forbidden_jumps.len() == before || !request.order.is_searched() {
+            given = order;
+            if forbidden_jumps.len() == before || request.order != VisitOrder::ThermalGradient {
                 break;
             }
         }
@@ -205,18 +189,16 @@ impl<'a> PlanBuilder<'a> {
         graph.forbidden().for_each(|(from, to)| housing.forbid(from, to));
         let given: Vec<usize> = (0..request.points.len()).collect();
         let mut orders = search_orders(&housing, &self.points, &given, request);
-        for ordered in &mut orders {
-            ordered.order.sort_by_key(|point| ranks[*point]);
-            ordered.proven = false;
+        for order in &mut orders {
+            order.sort_by_key(|point| ranks[*point]);
         }
-        let (ordered, direct, _) = self.best_of(&housing, orders).ok_or(PlanError::NoPoints)?;
+        let (_, direct) = self.best_of(&housing, orders).ok_or(PlanError::NoPoints)?;
         let mut worst: Vec<(Jump, Rejection)> = Vec::new();
         while let Some((visits, ways_around)) = self.lead_around(&graph, &direct) {
             let Walk { steps, forbidden, parameter_error } =
                 walk(request, &self.points, &self.targets, &visits, dwell_s)?;
             if forbidden.is_empty() {
-                let housing = Some(housing);
-                return Ok(Draft { dwell_s, ordered, visits, ways_around, steps, parameter_error, housing });
+                return Ok(Draft { dwell_s, visits, ways_around, steps, parameter_error });
             }
             let mut is_new = false;
             for ForbiddenJump { from, to, reasons } in forbidden {
@@ -257,28 +239,29 @@ impl<'a> PlanBuilder<'a> {
         Some((visits, ways))
     }
 
-    /// The order with the highest value including repeats, its visits, and whether they end with a return to the first point.
-    fn best_of(&self, housing: &Housing, orders: Vec<PointOrder>) -> Option<(PointOrder, Vec<Visit>, bool)> {
-        let objective = objective(self.request.order);
-        let with_visits = orders.into_iter().map(|ordered| {
-            let (visits, returned) = self.visits(housing, &ordered.order);
-            (value(housing, &visits, objective), (ordered, visits, returned))
+    /// The order with the highest value including repeats, and its visits.
+    fn best_of(&self, housing: &Housing, orders: Vec<Vec<usize>>) -> Option<(Vec<usize>, Vec<Visit>)> {
+        let with_visits = orders.into_iter().map(|order| {
+            let visits = self.visits(housing, &order);
+            (value(housing, &visits), (order, visits))
         });
         let better = |best: (f64, _), other: (f64, _)| if other.0 > best.0 { other } else { best };
         with_visits.reduce(better).map(|(_, best)| best)
     }
 
-    /// The visits of an order, and whether they end with a return to the first point.
-    fn visits(&self, housing: &Housing, order: &[usize]) -> (Vec<Visit>, bool) {
+    /// The visits of an order.
+    fn visits(&self, housing: &Housing, order: &[usize]) -> Vec<Visit> {
         let mut visits = match self.repeated {
-            Some(jump) => insert_repeats(housing, order, jump, objective(self.request.order)),
+            Some(jump) => insert_repeats(housing, order, jump),
             None => visits_of_points(order),
         };
-        let returned = self.request.return_to_first && append_return(&mut visits);
+        if self.request.return_to_first {
+            append_return(&mut visits);
+        }
         if let Some((from, to)) = self.appended {
             append_jump(&mut visits, from, to);
         }
-        (visits, returned)
+        visits
     }
 
     /// Simulates the same order with another dwell. Searches a new order if a limit forbids one of its jumps at that dwell.
@@ -291,19 +274,16 @@ impl<'a> PlanBuilder<'a> {
         if !forbidden.is_empty() {
             return self.draft(dwell_s);
         }
-        // The proof applies only to the dwell for which the order was searched.
-        let ordered = PointOrder { proven: false, ..draft.ordered };
-        Ok(Draft { dwell_s, ordered, steps, parameter_error, housing: None, ..draft })
+        Ok(Draft { dwell_s, steps, parameter_error, ..draft })
     }
 
-    /// Completes the plan with its figures, bound and remarks.
+    /// Completes the plan with its figures and remarks.
     pub(crate) fn plan(&self, draft: Draft) -> Result<Plan, PlanError> {
         let request = self.request;
         let timing = request.timing;
         let steps_s = draft.steps.iter().map(|step| step.dwell_s).sum::<f64>();
         let minutes = (timing.warm_up_s + steps_s + timing.cool_down_s) / 60.0;
         let figures = compute_figures(&draft.steps, minutes, draft.parameter_error);
-        let bound = if request.bound { self.bound(&draft)? } else { None };
         Ok(Plan {
             campaign: request.campaign_name.to_owned(),
             objective: request.order.name().to_owned(),
@@ -313,81 +293,9 @@ impl<'a> PlanBuilder<'a> {
             cool_down_s: timing.cool_down_s,
             remarks: self.remarks(&draft),
             figures,
-            bound_remark: self.bound_remark(&draft, bound.as_ref()),
-            bound,
             steps: draft.steps,
             surge_search_s: 0.0,
         })
-    }
-
-    /// Upper bounds on the gradients of any order with this dwell, if the order was searched for.
-    fn bound(&self, draft: &Draft) -> Result<Option<PlanBound>, PlanError> {
-        let request = self.request;
-        if !request.order.is_searched() || request.appended.is_some() || !draft.ways_around.is_empty() {
-            return Ok(None);
-        }
-        let housing = match &draft.housing {
-            Some(housing) => Cow::Borrowed(housing),
-            None => Cow::Owned(Housing::new(request, &self.points, &self.targets, draft.dwell_s)?),
-        };
-        let mut nodes: Vec<usize> = draft.ordered.order.clone();
-        let has_return = draft.visits.iter().any(|visit| visit.kind == StepKind::Return);
-        let counted = nodes.len();
-        // The ends of the repeated jump may lie outside the grid.
-        let mut place = |index: usize| {
-            nodes.iter().position(|node| *node == index).unwrap_or_else(|| {
-                nodes.push(index);
-                nodes.len() - 1
-            })
-        };
-        let repeated = self.repeated.map(|jump| RepeatedJump {
-            from: place(jump.from),
-            to: place(jump.to),
-            count: jump.count,
-        });
-        let Some(gradient_bounds) = GradientBounds::new(&housing, &nodes) else { return Ok(None) };
-        let order: Vec<usize> = draft.visits.iter().map(|visit| visit.index).collect();
-        let reduced_k = gradients_k(&*housing, &order);
-        let (mut found_k, mut excess_k, mut error_k) = (0.0, 0.0, 0.0f64);
-        for (step, reduced_k) in draft.steps.iter().skip(1).zip(&reduced_k) {
-            let deviation_k = step.predicted.dtc_k.unwrap_or(0.0).abs() - reduced_k;
-            error_k = error_k.max(deviation_k.abs());
-            if step.kind.measures() {
-                (found_k, excess_k) = (found_k + reduced_k, excess_k + deviation_k);
-            }
-        }
-        let bound = gradient_bounds.bound(counted, repeated, has_return, found_k);
-        // The bound applies to the reduced housing. Add the excess of the full model along this plan.
-        let (sum_bound_k, min_bound_k) = (bound.sum_k + f64::max(excess_k, 0.0), bound.min_k + error_k);
-        let found = compute_figures(&draft.steps, 0.0, None);
-        let below = |figure: f64, bound: f64| (bound > 0.0).then(|| 100.0 * (1.0 - figure / bound));
-        Ok(Some(PlanBound {
-            sum_gradient_k: sum_bound_k,
-            min_gradient_k: min_bound_k,
-            gap_percent: match request.order {
-                VisitOrder::ThermalGradient => below(found.sum_gradient_k, sum_bound_k),
-                _ => found.min_gradient_k.and_then(|min_k| below(min_k, min_bound_k)),
-            },
-            proven: draft.ordered.proven,
-            proof_tolerance_percent: draft.ordered.proven.then_some(100.0 * PROOF_TOLERANCE_RATIO),
-            model_error_k: error_k,
-        }))
-    }
-
-    /// Reason why the bound is missing.
-    fn bound_remark(&self, draft: &Draft, bound: Option<&PlanBound>) -> Option<NoBound> {
-        let request = self.request;
-        if bound.is_some() || !request.bound {
-            None
-        } else if !request.order.is_searched() {
-            Some(NoBound::OrderNotSearched)
-        } else if request.appended.is_some() {
-            Some(NoBound::AppendedJump)
-        } else if !draft.ways_around.is_empty() {
-            Some(NoBound::WayAround)
-        } else {
-            Some(NoBound::TooLarge)
-        }
     }
 
     fn remarks(&self, draft: &Draft) -> Vec<PlanRemark> {

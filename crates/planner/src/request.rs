@@ -53,8 +53,6 @@ pub struct PlanRequest<'a> {
     pub method: Option<&'a dyn PredictedMethod>,
     /// Factor on the duration of the search; 1 is the default, 0 nearly skips it.
     pub effort: f64,
-    /// Whether to compute an upper bound on the gradients of any order.
-    pub bound: bool,
     /// Seed of the search, passed on to simulated rigs.
     pub seed: u64,
 }

@@ -1,11 +1,14 @@
-//! Searches for a good order under thermal memory: simulated annealing with restarts, seeded, with a limited number of moves.
+//! Orders points by the rule of the request, or searches for a good order under thermal memory: simulated annealing with restarts,
+//! seeded, with a limited number of moves.
 //!
 //! A move swaps two points, reverses a short piece, or moves a piece elsewhere. Half of the moves are random; the others create a jump
 //! that the assignment of successors (`candidates`) favours. The effect of a move is computed from the first changed step until the
 //! housing has forgotten the change: a few steps, whatever the length of the order.
 
-use crate::housing::{Chain, gradients_k};
-use crate::objective::{Candidates, Objective};
+use crate::candidates::Candidates;
+use crate::housing::{Chain, Housing, sum_k, value_k};
+use crate::request::PlanRequest;
+use mapper_core::{OperatingPoint, VisitOrder};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::nearest_rank;
 use rand::{RngExt, SeedableRng};
@@ -18,11 +21,6 @@ const MAX_PIECE_LENGTH: usize = 50;
 const MANY_POINTS: usize = 500;
 /// Distance of the random seeds of two campaigns, whose own seeds are small integers: their starts must not share seeds.
 const SEED_STRIDE: u64 = 1_000_003;
-/// Number of targets in the search for the largest minimum gradient.
-const TARGET_ROUNDS: u64 = 10;
-/// Rise of the second target above the result of the first, relative to the mean gradient of a greedy order. A missed target halves the
-/// next rise.
-const FIRST_RISE_RATIO: f64 = 0.1;
 
 /// Amount of work of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,95 +46,66 @@ impl Effort {
     }
 }
 
-/// Returns the best order of each start, in order of value. No order is worse than `given`.
-pub fn search<C: Chain + Sync>(
-    chain: &C,
+/// Orders of the `given` points, the best first. Several are returned because repeats may change their ranking.
+pub(crate) fn search_orders(
+    housing: &Housing,
+    points: &[OperatingPoint],
     given: &[usize],
-    objective: Objective,
-    effort: Effort,
-    seed: u64,
+    request: &PlanRequest<'_>,
 ) -> Vec<Vec<usize>> {
-    search_among(chain, &Candidates::new(chain, given, objective), given, objective, effort, seed)
+    match request.order {
+        VisitOrder::Listed => vec![given.to_vec()],
+        VisitOrder::SpeedLines | VisitOrder::Conventional => {
+            let mut order = given.to_vec();
+            order.sort_by(|a, b| compare_along_speed_lines(&points[*a], &points[*b]));
+            vec![order]
+        }
+        VisitOrder::ThermalGradient => {
+            search(housing, given, Effort::usual(given.len(), request.effort), request.seed)
+        }
+    }
 }
 
-fn search_among<C: Chain + Sync>(
-    chain: &C,
-    candidates: &Candidates,
-    given: &[usize],
-    objective: Objective,
-    effort: Effort,
-    seed: u64,
-) -> Vec<Vec<usize>> {
+/// Order along speed lines: by speed, and on each line from the widest opening to the narrowest.
+fn compare_along_speed_lines(a: &OperatingPoint, b: &OperatingPoint) -> std::cmp::Ordering {
+    let by_opening = b.valve_opening_ratio.total_cmp(&a.valve_opening_ratio);
+    a.speed_rpm.total_cmp(&b.speed_rpm).then(by_opening)
+}
+
+/// Returns the best order of each start, by the sum of its gradients. No order is worse than `given`.
+pub fn search<C: Chain + Sync>(chain: &C, given: &[usize], effort: Effort, seed: u64) -> Vec<Vec<usize>> {
     if given.len() < 2 {
         return vec![given.to_vec()];
     }
-    let greedy = build_greedy_order(chain, given, objective);
+    let candidates = Candidates::new(chain, given);
+    let greedy = build_greedy_order(chain, given);
     let starts: Vec<u64> = (0..effort.starts.max(1)).collect();
     let run_from = |start: &u64| {
         let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_mul(SEED_STRIDE).wrapping_add(*start));
         let mut best = given.to_vec();
-        let mut best_figure = objective.figure(chain, &best);
-        Annealing::new(chain, candidates, &greedy, objective).run(
-            effort.moves,
-            &mut random,
-            &mut best,
-            &mut best_figure,
-        );
-        (best_figure, best)
+        let mut best_k = sum_k(chain, &best);
+        Annealing::new(chain, &candidates, &greedy).run(effort.moves, &mut random, &mut best, &mut best_k);
+        (best_k, best)
     };
     let mut found = parallel::map(&starts, run_from);
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.into_iter().map(|(_, order)| order).collect()
 }
 
-/// Searches for the order with the largest minimum gradient. The target rises as long as it is reached.
-pub fn search_min_gradient<C: Chain + Sync>(
-    chain: &C,
-    given: &[usize],
-    effort: Effort,
-    seed: u64,
-) -> Vec<usize> {
-    let min_k = |order: &[usize]| Objective::Minimum { target_k: 0.0 }.figure(chain, order);
-    let mut order = build_greedy_order(chain, given, Objective::Sum);
-    let mean_k = gradients_k(chain, &order).iter().sum::<f64>() / (given.len() as f64 - 1.0).max(1.0);
-    let mean_k = mean_k.min(chain.gradient_max_k());
-    let candidates = Candidates::new(chain, given, Objective::Minimum { target_k: mean_k });
-    let (mut best_k, mut rise_k) = (min_k(&order), mean_k);
-    // With many points, the smallest gradient needs more moves than the sum.
-    let times = if given.len() > MANY_POINTS { 2 } else { 1 } * effort.starts.max(1);
-    let each = Effort { moves: effort.moves.saturating_mul(times) / TARGET_ROUNDS, starts: 1 };
-    for round in 0..TARGET_ROUNDS {
-        let objective = Objective::Minimum { target_k: best_k.max(0.0) + rise_k };
-        let found = search_among(chain, &candidates, &order, objective, each, seed.wrapping_add(round))
-            .swap_remove(0);
-        let found_k = min_k(&found);
-        let risen_k = found_k - best_k;
-        if risen_k > 0.0 {
-            (order, best_k) = (found, found_k);
-        }
-        if round == 0 {
-            rise_k = FIRST_RISE_RATIO * mean_k;
-        } else if risen_k < 0.5 * rise_k {
-            rise_k *= 0.5;
-        }
-    }
-    order
-}
-
 /// Builds an order that continues at each position with the point of highest value.
-pub(crate) fn build_greedy_order<C: Chain>(chain: &C, given: &[usize], objective: Objective) -> Vec<usize> {
+fn build_greedy_order<C: Chain>(chain: &C, given: &[usize]) -> Vec<usize> {
     let mut remaining = given.to_vec();
     let mut order = Vec::with_capacity(given.len());
     let mut state = None;
     while !remaining.is_empty() {
         let next = match (state, order.last()) {
             (Some(state), Some(&from)) => {
-                let value = |to: usize| objective.value(chain, from, to, chain.step(from, to, state).0);
+                let value_k = |to: usize| value_k(chain, from, to, chain.step(from, to, state).0);
                 let mut best = (0, f64::NEG_INFINITY);
                 for (index, &to) in remaining.iter().enumerate() {
-                    let value = value(to);
-                    if value > best.1 {
-                        best = (index, value);
+                    let value_k = value_k(to);
+                    if value_k > best.1 {
+                        best = (index, value_k);
                     }
                 }
                 best.0
@@ -172,7 +141,6 @@ type StepState<S> = (Option<S>, f64);
 struct Annealing<'a, C: Chain> {
     chain: &'a C,
     candidates: &'a Candidates,
-    objective: Objective,
     order: Vec<usize>,
     /// Position of each point of the chain in the order; undefined for other points.
     position_of: Vec<usize>,
@@ -188,11 +156,10 @@ struct Annealing<'a, C: Chain> {
 }
 
 impl<'a, C: Chain> Annealing<'a, C> {
-    fn new(chain: &'a C, candidates: &'a Candidates, order: &[usize], objective: Objective) -> Self {
+    fn new(chain: &'a C, candidates: &'a Candidates, order: &[usize]) -> Self {
         let mut annealing = Annealing {
             chain,
             candidates,
-            objective,
             order: order.to_vec(),
             position_of: vec![0; chain.len()],
             step_states: vec![(None, 0.0); order.len() + 1],
@@ -237,7 +204,7 @@ impl<'a, C: Chain> Annealing<'a, C> {
         match (from, state) {
             (Some(from), Some(state)) => {
                 let (gradient_k, next) = self.chain.step(from, to, state);
-                (self.objective.value(self.chain, from, to, gradient_k), next)
+                (value_k(self.chain, from, to, gradient_k), next)
             }
             _ => (0.0, self.chain.first(to)),
         }
@@ -417,7 +384,7 @@ impl<'a, C: Chain> Annealing<'a, C> {
         !self.pieces.is_empty()
     }
 
-    fn run(&mut self, moves: u64, random: &mut Pcg64Mcg, best: &mut Vec<usize>, best_figure: &mut f64) {
+    fn run(&mut self, moves: u64, random: &mut Pcg64Mcg, best: &mut Vec<usize>, best_k: &mut f64) {
         // Typical change of value, from trial moves.
         let sizes: Vec<f64> = (0..200)
             .map(|_| {
@@ -441,11 +408,76 @@ impl<'a, C: Chain> Annealing<'a, C> {
             }
             // Recompute, so that differences neglected as indistinguishable do not accumulate.
             self.refresh();
-            let figure = self.objective.figure(self.chain, &self.order);
-            if figure > *best_figure {
-                *best_figure = figure;
+            let sum_k = sum_k(self.chain, &self.order);
+            if sum_k > *best_k {
+                *best_k = sum_k;
                 best.clone_from(&self.order);
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::housing::gradients_k;
+    use proptest::prelude::*;
+
+    /// Fixed weights: a machine without memory.
+    struct Fixed {
+        weights: Vec<f64>,
+        n: usize,
+        has_return: bool,
+    }
+
+    impl Chain for Fixed {
+        type State = ();
+        fn len(&self) -> usize {
+            self.n
+        }
+        fn first(&self, _: usize) {}
+        fn step(&self, from: usize, to: usize, (): ()) -> (f64, ()) {
+            (self.weights[from * self.n + to], ())
+        }
+        fn settled(&self, _: usize) {}
+        fn is_indistinguishable(&self, (): (), (): ()) -> bool {
+            true
+        }
+        fn has_return(&self) -> bool {
+            self.has_return
+        }
+    }
+
+    fn best_of_all(chain: &Fixed, path: &mut Vec<usize>) -> f64 {
+        if path.len() == chain.n {
+            return gradients_k(chain, path).iter().sum();
+        }
+        let mut best = f64::NEG_INFINITY;
+        for next in 0..chain.n {
+            if !path.contains(&next) {
+                path.push(next);
+                best = best.max(best_of_all(chain, path));
+                path.pop();
+            }
+        }
+        best
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn brute_force_agrees(weights in prop::collection::vec(0.0..30.0f64, 49), n in 2usize..=7) {
+            let mut chain = Fixed { weights: weights[..n * n].to_vec(), n, has_return: false };
+            let best = best_of_all(&chain, &mut Vec::new());
+            // The problem is so small that the search must find the optimum.
+            let given: Vec<usize> = (0..n).collect();
+            let found = search(&chain, &given, Effort { moves: 20_000, starts: 2 }, 7).swap_remove(0);
+            prop_assert!((sum_k(&chain, &found) - best).abs() < 1e-9);
+            // Include the return to the first point.
+            chain.has_return = true;
+            let best = best_of_all(&chain, &mut Vec::new());
+            let found = search(&chain, &given, Effort { moves: 20_000, starts: 2 }, 7).swap_remove(0);
+            prop_assert!((sum_k(&chain, &found) - best).abs() < 1e-9);
         }
     }
 }

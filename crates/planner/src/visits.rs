@@ -1,8 +1,7 @@
 //! The visits of a plan: its points in order, repeats of one jump to detect drift, the return to the first point, and an appended jump.
 
-use crate::housing::{Chain, RepeatedJump, return_jump};
+use crate::housing::{Chain, FORBIDDEN_PENALTY_K, RepeatedJump, return_jump, value_k};
 use crate::jump_forecast::forecast_jump;
-use crate::objective::{FORBIDDEN_PENALTY, Objective};
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::{Jump, OperatingPoint, Repeats, StepKind};
 use mapper_physics::simulation::steady::SteadyState;
@@ -79,12 +78,7 @@ pub(crate) fn visits_of_points(order: &[usize]) -> Vec<Visit> {
 ///
 /// Each repeat may move by a quarter of the spacing to a position where the order visits the start of the jump anyway, so that the repeat
 /// adds one step instead of two. Among equal positions, the one with the smallest loss of gradient at the points wins.
-pub(crate) fn insert_repeats<C: Chain>(
-    chain: &C,
-    order: &[usize],
-    jump: RepeatedJump,
-    objective: Objective,
-) -> Vec<Visit> {
+pub(crate) fn insert_repeats<C: Chain>(chain: &C, order: &[usize], jump: RepeatedJump) -> Vec<Visit> {
     let mut visits = visits_of_points(order);
     let (points, count) = (order.len(), jump.count);
     let spacing = points as f64 / (count.max(2) - 1) as f64;
@@ -93,7 +87,7 @@ pub(crate) fn insert_repeats<C: Chain>(
     for repeat in 0..count {
         // Position as a number of points, at least one.
         let ideal = ((repeat as f64 * spacing).round() as usize).clamp(1, points);
-        let before = value(chain, &visits, objective);
+        let before = value(chain, &visits);
         let best_of = |places: std::ops::RangeInclusive<usize>| {
             // Exclude positions between the two steps of another repeat.
             let free =
@@ -103,9 +97,9 @@ pub(crate) fn insert_repeats<C: Chain>(
                 .map(|place| {
                     let at = place + inserted;
                     let trial = insert_repeat(&visits, at, jump);
-                    let value = value(chain, &trial, objective);
+                    let value = value(chain, &trial);
                     // Prefer allowed positions, then fewer steps.
-                    let is_forbidden = value < before - 0.5 * FORBIDDEN_PENALTY;
+                    let is_forbidden = value < before - 0.5 * FORBIDDEN_PENALTY_K;
                     ((is_forbidden, trial.len()), -value, place.abs_diff(ideal), trial)
                 })
                 .min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)))
@@ -124,15 +118,12 @@ pub(crate) fn insert_repeats<C: Chain>(
     visits
 }
 
-/// Appends a visit of the first point, unless the visits already end there. Returns whether it was appended.
-pub(crate) fn append_return(visits: &mut Vec<Visit>) -> bool {
-    match visits.as_slice() {
-        [first, .., last] if first.index != last.index => {
-            let index = first.index;
-            visits.push(Visit { index, kind: StepKind::Return });
-            true
-        }
-        _ => false,
+/// Appends a visit of the first point, unless the visits already end there.
+pub(crate) fn append_return(visits: &mut Vec<Visit>) {
+    if let [first, .., last] = visits.as_slice()
+        && first.index != last.index
+    {
+        visits.push(Visit { index: first.index, kind: StepKind::Return });
     }
 }
 
@@ -156,7 +147,7 @@ fn insert_repeat(visits: &[Visit], at: usize, jump: RepeatedJump) -> Vec<Visit> 
 }
 
 /// Value of the visits that measure points. Repeats count only if they are forbidden.
-pub(crate) fn value<C: Chain>(chain: &C, visits: &[Visit], objective: Objective) -> f64 {
+pub(crate) fn value<C: Chain>(chain: &C, visits: &[Visit]) -> f64 {
     let Some(first) = visits.first() else { return 0.0 };
     let (mut state, mut sum) = (chain.first(first.index), 0.0);
     let order: Vec<usize> = visits.iter().map(|visit| visit.index).collect();
@@ -164,7 +155,7 @@ pub(crate) fn value<C: Chain>(chain: &C, visits: &[Visit], objective: Objective)
     let jumps = visits.windows(2).map(|pair| (pair[0].index, pair[1].index, pair[1].kind));
     for (from, to, kind) in jumps.chain(back.map(|(last, first)| (last, first, StepKind::Return))) {
         let (gradient_k, next) = chain.step(from, to, state);
-        let value = objective.value(chain, from, to, gradient_k);
+        let value = value_k(chain, from, to, gradient_k);
         let allowed = chain.admissible(from, to) && gradient_k.abs() <= chain.gradient_max_k();
         if kind.measures() || !allowed {
             sum += value;

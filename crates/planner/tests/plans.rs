@@ -9,36 +9,25 @@ use mapper_core::{Dwell, Jump, OperatingPoint, PlanRemark, Repeats, StepKind, Vi
 use mapper_physics::simulation::model::Model;
 use mapper_planner::housing::gradients_k;
 use mapper_planner::{
-    Effort, Objective, PlanError, PlanRequest, Rejection, explain_jump, forecast_all_jumps, make_plan,
-    max_steps, search, search_min_gradient,
+    Effort, PlanError, PlanRequest, Rejection, explain_jump, forecast_all_jumps, make_plan, max_steps, search,
 };
 
 #[test]
-fn the_search_beats_the_listed_order_and_stays_below_its_bound() {
+fn the_search_beats_the_listed_order() {
     let (model, points) = (Model::nominal(), grid());
     let plan = |order| make_plan(&request(&model, &points, order)).unwrap();
     let listed = plan(VisitOrder::Listed);
-    let (sum, worst) = (plan(VisitOrder::ThermalGradient), plan(VisitOrder::MinGradient));
+    let sum = plan(VisitOrder::ThermalGradient);
     assert!(sum.figures.sum_gradient_k > 2.0 * listed.figures.sum_gradient_k);
-    // A hand-made zigzag has 14.6 K at minimum on a simpler housing, a simple annealing 25.6 K.
-    assert!(worst.figures.min_gradient_k.unwrap() > 20.0);
-    for plan in [&sum, &worst] {
-        let bound = plan.bound.unwrap();
-        assert!(plan.figures.sum_gradient_k <= bound.sum_gradient_k);
-        assert!(plan.figures.min_gradient_k.unwrap() <= bound.min_gradient_k);
-        assert!(bound.gap_percent.unwrap() >= 0.0);
-        // A fraction of a thermocouple's offset; the ramps of P3 depend on the point before.
-        assert!(bound.model_error_k < 0.7, "{}", bound.model_error_k);
-        for point in &points {
-            assert_eq!(plan.steps.iter().filter(|step| step.to == *point).count(), 1);
-        }
+    for point in &points {
+        assert_eq!(sum.steps.iter().filter(|step| step.to == *point).count(), 1);
     }
     assert_eq!(sum.steps[0].predicted.dtc_k, None);
     assert_eq!(sum, plan(VisitOrder::ThermalGradient), "same seed, same plan");
 }
 
 /// Housing with one time constant per point, as in `common::SimpleHousing`: the kind of housing on which a simple
-/// annealing reached 677 K in total, or 25.6 K at minimum.
+/// annealing reached 677 K in total.
 #[test]
 fn the_search_reaches_the_figures_of_another_annealing_on_a_simple_housing() {
     let (model, points) = (Model::nominal(), grid());
@@ -53,9 +42,8 @@ fn the_search_reaches_the_figures_of_another_annealing_on_a_simple_housing() {
         (0..3).flat_map(|opening| [2, 5, 0, 4, 1, 3].map(|speed| 3 * speed + opening)).collect();
     assert!((sum_of(&zigzag) - 640.0).abs() < 2.0 && (worst_of(&zigzag) - 14.6).abs() < 0.06);
     let effort = Effort::usual(points.len(), 0.3);
-    let sum_k = sum_of(&search(&housing, &given, Objective::Sum, effort, 1)[0]);
-    let worst_k = worst_of(&search_min_gradient(&housing, &given, effort, 1));
-    assert!(sum_k > 0.98 * 677.0 && worst_k > 0.98 * 25.6, "{sum_k} {worst_k}");
+    let sum_k = sum_of(&search(&housing, &given, effort, 1)[0]);
+    assert!(sum_k > 0.98 * 677.0, "{sum_k}");
 }
 
 #[test]
@@ -143,7 +131,6 @@ fn repeats_make_the_same_jump_and_every_point_is_still_visited() {
         let visit = |step: &&mapper_core::PlanStep| step.to == *point && step.kind == StepKind::Point;
         assert_eq!(plan.steps.iter().filter(visit).count(), 1);
     }
-    assert!(plan.figures.sum_gradient_k <= plan.bound.unwrap().sum_gradient_k);
 }
 
 #[test]
@@ -199,14 +186,13 @@ fn an_appended_jump_comes_last_and_changes_nothing_before_it() {
 }
 
 #[test]
-fn the_best_order_of_few_points_is_found_and_proven() {
+fn the_best_order_of_few_points_is_found() {
     let (model, points) = (Model::nominal(), grid());
     let few = [points[0], points[5], points[10], points[15], points[17]];
     for return_to_first in [false, true] {
         let plan =
             make_plan(&PlanRequest { return_to_first, ..request(&model, &few, VisitOrder::ThermalGradient) })
                 .unwrap();
-        assert!(plan.bound.unwrap().proven);
         // All 120 orders in full.
         let mut best_k = 0.0f64;
         permute(&mut few.clone(), 0, &mut |order| {
@@ -215,7 +201,6 @@ fn the_best_order_of_few_points_is_found_and_proven() {
                     .unwrap();
             best_k = best_k.max(plan.figures.sum_gradient_k);
         });
-        assert!(plan.bound.unwrap().sum_gradient_k >= best_k);
         // The reduced housing may prefer another order of nearly equal value.
         assert!(plan.figures.sum_gradient_k > 0.999 * best_k, "{} {best_k}", plan.figures.sum_gradient_k);
     }
@@ -226,7 +211,7 @@ fn the_best_order_of_few_points_is_found_and_proven() {
 #[test]
 fn the_first_point_is_visited_again_at_the_end() {
     let (model, points) = (Model::nominal(), grid());
-    for order in [VisitOrder::Listed, VisitOrder::ThermalGradient, VisitOrder::MinGradient] {
+    for order in [VisitOrder::Listed, VisitOrder::ThermalGradient] {
         let mut returning = request(&model, &points, order);
         (returning.effort, returning.return_to_first) = (0.1, true);
         returning.repeats = Some(Repeats { jump: None, every_steps: 12, at_least: 2 });
@@ -247,10 +232,6 @@ fn the_first_point_is_visited_again_at_the_end() {
             "{:?}",
             plan.remarks
         );
-        if let Some(bound) = plan.bound {
-            assert!(plan.figures.sum_gradient_k <= bound.sum_gradient_k);
-            assert!(plan.figures.min_gradient_k.unwrap() <= bound.min_gradient_k);
-        }
         // An appended jump comes after the return.
         let appended = Some(Jump { from: points[1], to: points[16] });
         let longer = make_plan(&PlanRequest { appended, ..returning.clone() }).unwrap();
@@ -300,8 +281,6 @@ fn the_dwell_fills_the_time_budget_without_exceeding_it() {
         assert!(plan.steps.len() <= max_steps(&budgeted));
         assert!(plan.steps.iter().all(|step| step.dwell_s == dwell_s), "all steps last equally long");
         assert!(plan.duration_s() <= 60.0 * minutes && plan.duration_s() + steps > 60.0 * minutes);
-        // The bound is that of the dwell that was chosen.
-        assert!(plan.figures.sum_gradient_k <= plan.bound.unwrap().sum_gradient_k);
     }
     // An hour of warm-up leaves 3 s a step.
     budgeted.timing.dwell = Dwell::TimeBudget(3660.0);
@@ -322,7 +301,6 @@ fn conventional_mapping_waits_for_stability() {
     let mean_min = plan.steps.iter().map(|step| step.dwell_s).sum::<f64>() / 60.0 / plan.steps.len() as f64;
     assert!((1.0..15.0).contains(&mean_min), "{mean_min} min");
     assert!(plan.steps.iter().skip(1).all(|step| step.predicted.settle_s.is_some()));
-    assert_eq!(plan.bound, None);
 }
 
 #[test]

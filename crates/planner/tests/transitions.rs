@@ -41,7 +41,7 @@ fn points() -> impl Strategy<Value = Vec<OperatingPoint>> {
 fn stand<'a>(model: &'a Model, points: &'a [OperatingPoint], actuators: RigActuators) -> PlanRequest<'a> {
     let mut stand = request(model, points, VisitOrder::Listed);
     stand.window = WindowRule::Auto;
-    (stand.actuators, stand.bound) = (actuators, false);
+    stand.actuators = actuators;
     (stand.limits.speed_max_rpm, stand.limits.p3_max_pa) = (160e3, 600e3);
     stand.timing.dwell = Dwell::Fixed(60.0);
     stand

@@ -59,8 +59,6 @@ pub fn plan() -> Plan {
             worst_error_eta: None,
             minutes: 1.0,
         },
-        bound: None,
-        bound_remark: None,
         surge_search_s: 0.0,
         remarks: Vec::new(),
     }

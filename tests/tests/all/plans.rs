@@ -45,7 +45,7 @@ fn number(value: &Value) -> f64 {
 /// lags by 0.3 s, and the noise of these means, about 0.1 K.
 #[test]
 fn every_order_passes_the_guards_and_moves_t2_as_forecast() {
-    for order in ["listed", "thermal_gradient", "min_gradient", "speed_lines"] {
+    for order in ["listed", "thermal_gradient", "speed_lines"] {
         let window = ("window: auto ", "window: {start: 10 s, end: 40 s} ");
         let campaign = campaign(order, &[window]);
         let planned = plan(&campaign);
@@ -62,30 +62,16 @@ fn every_order_passes_the_guards_and_moves_t2_as_forecast() {
                 "{order}: {measured_k} K for {forecast_k} K"
             );
         }
-        // A bound is never below what was found; an unknown bound is reported as that.
-        let (figures, bound) = (&planned["figures"], &planned["bound"]);
-        if bound.is_object() {
-            assert!(number(&figures["sum_gradient_k"]) <= number(&bound["sum_gradient_k"]), "{order}");
-            assert!(number(&figures["min_gradient_k"]) <= number(&bound["min_gradient_k"]), "{order}");
-        }
-        let searched = ["thermal_gradient", "min_gradient"].contains(&order);
-        assert_eq!((bound.is_object(), planned["bound_remark"].is_null()), (searched, searched), "{order}");
     }
 }
 
 /// Each order is the best by its own figure, and each kind of dwell keeps its requirement.
 #[test]
 fn orders_and_dwells_improve_what_they_are_chosen_for() {
-    let [total, least, lines] =
-        ["thermal_gradient", "min_gradient", "speed_lines"].map(|order| plan(&campaign(order, &[])));
+    let [total, lines] = ["thermal_gradient", "speed_lines"].map(|order| plan(&campaign(order, &[])));
     let figure = |plan: &Value, name: &str| number(&plan["figures"][name]);
     // The order is found on the reduced housing; in full it may be off in the third digit.
-    for other in [&least, &lines] {
-        assert!(figure(&total, "sum_gradient_k") >= 0.999 * figure(other, "sum_gradient_k"));
-    }
-    for other in [&total, &lines] {
-        assert!(figure(&least, "min_gradient_k") >= 0.999 * figure(other, "min_gradient_k"));
-    }
+    assert!(figure(&total, "sum_gradient_k") >= 0.999 * figure(&lines, "sum_gradient_k"));
     let dwell = |text: &'static str| plan(&campaign("thermal_gradient", &[("dwell: 120 s ", text)]));
     assert!(figure(&dwell("time_budget: 12 min "), "minutes") <= 12.0);
     let required = dwell("required_sigma_eta: 2.5 % ");

@@ -1,6 +1,6 @@
 //! The plan as data: steps, their order, and the expected results.
 
-use crate::test_plan::plan_remark::{NoBound, PlanRemark, deserialize_no_bound, deserialize_remarks};
+use crate::test_plan::plan_remark::{PlanRemark, deserialize_remarks};
 use crate::test_plan::transition::Transition;
 use crate::unit_factors::S_PER_MIN;
 use crate::{AvoidedCrossing, AvoidedRange, OperatingPoint, step_number};
@@ -159,23 +159,6 @@ pub struct PlanFigures {
     pub minutes: f64,
 }
 
-/// Bounds on the best possible order, by the housing model of the search.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct PlanBound {
-    /// Upper bound on the sum of housing gradients of any order, K.
-    pub sum_gradient_k: f64,
-    /// Upper bound on the smallest housing gradient of any order, K.
-    pub min_gradient_k: f64,
-    /// Gap between the optimised figure and its bound, % of the bound; `None` if no bound is known.
-    pub gap_percent: Option<f64>,
-    /// Whether the order was shown to be the best within `proof_tolerance_percent`, by branch and bound.
-    pub proven: bool,
-    /// Tolerance of the proof, %; `None` without one.
-    pub proof_tolerance_percent: Option<f64>,
-    /// Maximum deviation of the search's housing model from the full simulation along this plan, K of gradient.
-    pub model_error_k: f64,
-}
-
 /// An ordered, checked list of steps with their expected results.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
@@ -198,12 +181,6 @@ pub struct Plan {
     pub surge_search_s: f64,
     /// Summary of the plan.
     pub figures: PlanFigures,
-    /// Bounds on the best possible order; `None` if the order was not searched for.
-    #[serde(default)]
-    pub bound: Option<PlanBound>,
-    /// Reason why there is no bound; `None` if there is one, or none was requested.
-    #[serde(default, deserialize_with = "deserialize_no_bound")]
-    pub bound_remark: Option<NoBound>,
     /// Remarks for the operator of the plan.
     #[serde(
         default,

@@ -41,20 +41,6 @@ PlanRemark {
 }
 }
 
-/// Reason for a missing bound on the gradients of a plan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum NoBound {
-    /// The order was not searched for.
-    OrderNotSearched,
-    /// A jump was appended to the points.
-    AppendedJump,
-    /// The plan leads around forbidden jumps.
-    WayAround,
-    /// There are too many points for its table, or the housing states are unbounded.
-    TooLarge,
-}
-
 /// Reads the remarks of a plan; those of older plans are sentences.
 pub(crate) fn deserialize_remarks<'de, D: Deserializer<'de>>(
     deserializer: D,
@@ -65,14 +51,6 @@ pub(crate) fn deserialize_remarks<'de, D: Deserializer<'de>>(
         typed => serde_json::from_value(typed).map_err(serde::de::Error::custom),
     };
     stored.into_iter().map(read).collect()
-}
-
-/// Reads the reason for a missing bound; that of older plans is a sentence, and is dropped.
-pub(crate) fn deserialize_no_bound<'de, D: Deserializer<'de>>(
-    deserializer: D,
-) -> Result<Option<NoBound>, D::Error> {
-    let stored = Option::<Value>::deserialize(deserializer)?;
-    Ok(stored.and_then(|value| serde_json::from_value(value).ok()))
 }
 
 /// Expected verdicts of a campaign.

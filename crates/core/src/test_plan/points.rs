@@ -121,7 +121,8 @@ named_enum! {
     #[schemars(transform = crate::enums::flatten_to_names)]
     #[schemars(extend("x-removed" = {
         "sum_gradient": "write `order: thermal_gradient`, its new name",
-        "worst_gradient": "write `order: min_gradient`, its new name",
+        "min_gradient": "write `order: thermal_gradient`, the default, or one of `speed_lines`, `listed`, `conventional`",
+        "worst_gradient": "write `order: thermal_gradient`, the default, or one of `speed_lines`, `listed`, `conventional`",
         "information": "write `order: thermal_gradient`, which needs no more rig time for the same error",
         "time": "write `order: thermal_gradient` with `required_sigma_eta`, which chooses one dwell for all steps",
         "best": "write `order: thermal_gradient`; `mapper plan --compare` shows the other orders",
@@ -131,20 +132,11 @@ named_enum! {
         /// Largest sum of the housing's temperature changes within the windows (Burke et al., figure 13 b).
         #[default]
         ThermalGradient = "thermal_gradient",
-        /// Largest minimum of these changes.
-        MinGradient = "min_gradient",
         /// By speed, on each line from the widest valve opening to the narrowest (Burke et al., figure 13 a).
         SpeedLines = "speed_lines",
         /// The order of the grid.
         Listed = "listed",
         /// As `speed_lines`, but each step lasts until T2 and the housing no longer drift: conventional mapping, for comparison.
         Conventional = "conventional",
-    }
-}
-
-impl VisitOrder {
-    /// Whether the planner searches for the order.
-    pub fn is_searched(self) -> bool {
-        matches!(self, VisitOrder::ThermalGradient | VisitOrder::MinGradient)
     }
 }

@@ -49,7 +49,6 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
         appended: None,
         method: None,
         effort: 0.3,
-        bound: true,
         seed: 1,
     }
 }

@@ -2,12 +2,11 @@
 
 use crate::document::{Cell, Document, Table};
 use crate::formatting::{Display, Message, duration, eta, number, percent};
-use crate::plan::plan_remark_text::no_bound_text;
 use mapper_campaign::Campaign;
 use mapper_chart::{Annotation, Axis, Colour, Figure, Line, Panel, PointLabels, Scatter};
 use mapper_core::{
-    AvoidedCrossing, OperatingPoint, Plan, PlanBound, PlanStep, Recording, StepKind, Transition, VisitOrder,
-    WindowRule, standard_error_of, step_number,
+    AvoidedCrossing, OperatingPoint, Plan, PlanStep, Recording, StepKind, Transition, WindowRule,
+    standard_error_of, step_number,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
@@ -109,8 +108,8 @@ fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> Vec<(&'static str, 
         ("rig time", format!("{} ({})", duration(soak_s + plan.duration_s()), parts.join(", "))),
     ];
     if let Some(min_gradient_k) = figures.min_gradient_k {
-        let least = format!("{min_gradient_k:.1} K{}", least_bound(plan));
-        lines.extend([("total gradient", total_gradient(plan)), ("min gradient", least)]);
+        let total = format!("{:.0} K of housing temperature over all points", figures.sum_gradient_k);
+        lines.extend([("total gradient", total), ("min gradient", format!("{min_gradient_k:.1} K"))]);
     }
     let declared = figures.rms_error_eta.map(|error| {
         format!(
@@ -134,7 +133,6 @@ fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> Vec<(&'static str, 
         &Display::new(&campaign.display),
         &campaign.display.speed.to_string(),
     ));
-    lines.extend(plan.bound_remark.iter().map(|reason| ("bound", no_bound_text(*reason).to_owned())));
     lines.extend(plan.remarks.iter().map(|remark| ("note", remark.message())));
     if !campaign.machine.assumed.is_empty() {
         let sizes = match campaign.machine.assumed.len() {
@@ -199,34 +197,6 @@ fn steps(steps: &[PlanStep]) -> String {
         count if shortest_s == longest_s => format!("{count} steps of {shortest_s:.0} s"),
         count => format!("{count} steps of {shortest_s:.0} to {longest_s:.0} s"),
     }
-}
-
-fn total_gradient(plan: &Plan) -> String {
-    let total = format!("{:.0} K of housing temperature over all points", plan.figures.sum_gradient_k);
-    let Some(bound) = &plan.bound else { return total };
-    let bounded = format!("{total}; no order exceeds {:.0} K", bound.sum_gradient_k);
-    let by_gap = |gap: f64| format!("{bounded}, so this one is within {gap:.1} % of the best possible");
-    match (bound.gap_percent, bound.proof_tolerance_percent) {
-        (Some(_), Some(tolerance)) if plan.objective == VisitOrder::ThermalGradient.name() => {
-            format!("{total}; proven to be the best order within {tolerance:.1} %")
-        }
-        (Some(gap), _) if plan.objective == VisitOrder::ThermalGradient.name() => by_gap(gap),
-        _ => bounded,
-    }
-}
-
-fn least_bound(plan: &Plan) -> String {
-    let bound_text = |bound: &PlanBound| match (bound.proof_tolerance_percent, bound.gap_percent) {
-        (Some(tolerance), _) => format!("; proven to be the best order within {tolerance:.1} %"),
-        (None, Some(gap)) => {
-            format!("; no order exceeds {:.1} K, so this one is within {gap:.1} %", bound.min_gradient_k)
-        }
-        (None, None) => String::new(),
-    };
-    plan.bound
-        .as_ref()
-        .filter(|_| plan.objective == VisitOrder::MinGradient.name())
-        .map_or_else(String::new, bound_text)
 }
 
 /// Time of the steps, minutes.

@@ -1,7 +1,7 @@
 //! Sentences of the remarks of plans.
 
 use crate::formatting::Message;
-use mapper_core::{Channel, NoBound, OperatingPoint, PlanRemark, with_unit};
+use mapper_core::{Channel, OperatingPoint, PlanRemark, with_unit};
 use std::collections::BTreeMap;
 
 fn place(point: &OperatingPoint) -> String {
@@ -124,16 +124,4 @@ fn list_sigmas(sigmas: &BTreeMap<Channel, f64>) -> String {
         format!("{channel} {}", with_unit(format!("{sigma:.digits$}"), channel.unit()))
     };
     sigmas.iter().map(named).collect::<Vec<_>>().join(", ")
-}
-
-/// Why a plan has no bound.
-pub(crate) fn no_bound_text(reason: NoBound) -> &'static str {
-    match reason {
-        NoBound::OrderNotSearched => "the order was not searched for",
-        NoBound::AppendedJump => "none: a jump was appended to the points",
-        NoBound::WayAround => "none: the plan leads around forbidden jumps",
-        NoBound::TooLarge => {
-            "none: too many points for its table, or the states of the housing are unbounded"
-        }
-    }
 }

@@ -139,7 +139,7 @@ fn plan_of_sample(
     effort: f64,
 ) -> Result<Plan, SessionError> {
     let inputs = PlanInputs::of(campaign)?;
-    let mut request = PlanRequest { bound: false, effort, ..inputs.request(campaign, model) };
+    let mut request = PlanRequest { effort, ..inputs.request(campaign, model) };
     if let Dwell::TimeBudget(budget_s) = request.timing.dwell {
         let share = max_steps(&request) as f64;
         let fixed_s = request.timing.warm_up_s + request.timing.cool_down_s;

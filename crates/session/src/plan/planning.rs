@@ -57,7 +57,7 @@ pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, S
 /// The points of a campaign in planned order, without any further forecast.
 pub(crate) fn order_points(campaign: &Campaign, model: &Model) -> Result<Vec<OperatingPoint>, SessionError> {
     let inputs = PlanInputs::of(campaign)?;
-    let request = PlanRequest { method: None, bound: false, ..inputs.request(campaign, model) };
+    let request = PlanRequest { method: None, ..inputs.request(campaign, model) };
     Ok(make_plan(&request)?.steps.into_iter().map(|step| step.to).collect())
 }
 
@@ -108,7 +108,6 @@ impl PlanInputs {
             return_to_first: campaign.return_to_first && transient,
             method: self.method.as_deref(),
             effort: 1.0,
-            bound: true,
             seed: campaign.seed,
         }
     }

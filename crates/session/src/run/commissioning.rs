@@ -206,8 +206,6 @@ fn plan_of_steps(campaign: &Campaign, model: &Model, steps: Vec<PlanStep>) -> Re
         steps,
         surge_search_s: 0.0,
         figures: PlanFigures::default(),
-        bound: None,
-        bound_remark: None,
         remarks: Vec::new(),
     };
     plan.figures.minutes = plan.duration_s() / 60.0;

@@ -20,15 +20,14 @@ const FORMULAS: &[(&str, &[f64], &str)] = &[
     ("crates/recording/src/logs/proposal/physics.rs", &[4.0], "area of a circle"),
     ("crates/recording/src/logs/proposal/shared_units.rs", &[4.0], "area of a circle"),
     ("crates/numerics/src/coloured_noise.rs", &[6.0, 24.0, 120.0, 720.0, 5040.0], "series of e^-x"),
-    ("crates/numerics/src/minimise.rs", &[3.0], "Brent's rule of the shortest step"),
-    ("crates/numerics/src/root.rs", &[4.0], "Brent's tolerance"),
+    ("crates/numerics/src/root.rs", &[3.0, 4.0], "Brent's rule of the shortest step, and his tolerance"),
     (
         "crates/observe/src/model_inputs/smoother.rs",
         &[0.25, 3.0],
         "cubic with given slopes; integrated noise; window of a spline",
     ),
     ("crates/maps/src/map_fit/least_squares/solution.rs", &[3.0], "variance of a uniform share"),
-    ("crates/maps/src/map_fit/speed_lines/speed_spline.rs", &[3.0, 6.0], "natural cubic spline"),
+    ("crates/maps/src/map_fit/speed_lines.rs", &[3.0, 6.0], "natural cubic spline"),
 ];
 
 /// Maximum number of judgements: as many as a reader can examine.

@@ -23,10 +23,12 @@ mod testing;
 pub use crate::elements::turbocharger::machine::{NominalTableError, nominal_table};
 pub use actuator_lines::{ActuatorValue, actuator_lines, with_actuators};
 pub use campaign::Campaign;
-pub use checks::calibration::{CalibrationWarning, forecast_calibration_warnings};
-pub use checks::map_misfit::{MapMisfit, find_map_misfit};
-pub use checks::reachable_points::{Concern, UnreachablePoint, nominal_model, unreachable_points};
-pub use checks::unusual_settings::USUAL_WHEEL_DIAMETERS_M;
+pub use checks::map_misfit::{
+    Concern, MapMisfit, UnreachablePoint, find_map_misfit, nominal_model, unreachable_points,
+};
+pub use checks::unusual_settings::{
+    CalibrationWarning, USUAL_WHEEL_DIAMETERS_M, forecast_calibration_warnings,
+};
 pub use elements::rig::guards::DEFAULT_MAX_AGE_S;
 pub use elements::rig::sensor_class::{default_contact_sigma_ratio, default_gain_sigma_ratio};
 pub use load::{

@@ -1,8 +1,8 @@
 //! Reads a campaign from a text or a file, or reports all its mistakes; the JSON schema of the file.
 
 use crate::campaign::{Campaign, CampaignFile};
-use crate::checks::reachable_points::{Concern, UnreachablePoint};
-use crate::checks::{reachable_points, unusual_settings};
+use crate::checks::map_misfit::{Concern, UnreachablePoint};
+use crate::checks::{map_misfit, unusual_settings};
 use crate::resolved::limit_is_wrong;
 use crate::{machine_sizes, resolved};
 use mapper_maps::table::file_text;
@@ -58,8 +58,8 @@ pub fn check(
 ) -> Result<Campaign, Findings> {
     check_with(text, origin, files, &|campaign| {
         // An unreadable map is already reported.
-        reachable_points::nominal_model(campaign)
-            .map(|model| reachable_points::unreachable_points(campaign, &model))
+        map_misfit::nominal_model(campaign)
+            .map(|model| map_misfit::unreachable_points(campaign, &model))
             .unwrap_or_default()
     })
 }
@@ -87,7 +87,7 @@ pub fn check_with(
     }
     SCHEMA.check(&tree, &mut notes);
     if !notes.is_full() {
-        reachable_points::check_consistency(&tree, files, &mut notes);
+        map_misfit::check_consistency(&tree, files, &mut notes);
     }
     let campaign = notes.is_empty().then(|| deserialise(&tree, files, unreachable, &mut notes)).flatten();
     campaign.ok_or_else(|| tree.findings(notes))
@@ -199,7 +199,7 @@ fn deserialise(
     errors.for_each(|concern| note(tree, notes, FindingKind::Implausible, concern));
     if notes.is_empty()
         && !campaign.lines.is_empty()
-        && let Ok(model) = reachable_points::nominal_model(&campaign)
+        && let Ok(model) = map_misfit::nominal_model(&campaign)
     {
         match resolved::resolve(&mut campaign, &model) {
             Ok(()) => point_paths = resolved::places(&campaign),

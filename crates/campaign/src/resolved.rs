@@ -1,7 +1,7 @@
 //! Resolves the speed lines of a campaign to points on the nominal machine.
 
 use crate::campaign::Campaign;
-use crate::checks::reachable_points::Concern;
+use crate::checks::map_misfit::Concern;
 use mapper_core::OperatingPoint;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::line_points::{LineRequest, Spread, line_points};

@@ -1,16 +1,14 @@
 //! Draws a figure: arrow heads, items, panels.
 
-use crate::clip::{self, Rect};
-use crate::contours::{band, contour_lines, place, without_gap};
+use crate::contours::{self, Rect, band, contour_lines, place, without_gap};
 use crate::drawing::{Drawing, Stroke, TextAnchor, TextStyle};
 use crate::frame::Frame;
 use crate::items::{Annotation, Item, Line, LineEnd, Rule, RuleAt, Scatter};
 use crate::layout::{
-    AXIS_TITLE_PX, MARGIN_PX, PANEL_TITLE_PX, PlacedPanel, SUBTITLE_PX, TICK_PX, TITLE_PX, draw_legend,
-    draw_marker, layout,
+    AXIS_TITLE_PX, MARGIN_PX, PANEL_TITLE_PX, PlacedPanel, SUBTITLE_PX, Surroundings, TICK_PX, TITLE_PX,
+    draw_legend, draw_marker, layout,
 };
 use crate::palette::{BLUE, Colour, GREY, INK, LIGHT_GREY};
-use crate::point_labels::Surroundings;
 use crate::text::{cut, width_px};
 use crate::{Contours, Figure, Panel};
 
@@ -78,7 +76,7 @@ fn draw_panel(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
             Item::Contours(item) => draw_contours(drawing, frame, item, &mut obstacles, &mut late),
             Item::Polygon(item) => {
                 let points: Vec<_> = item.points.iter().map(|p| frame.px(*p)).collect();
-                drawing.areas(&[clip::polygon(&points, &frame.rect)], item.colour, item.opacity);
+                drawing.areas(&[contours::polygon(&points, &frame.rect)], item.colour, item.opacity);
             }
             Item::Annotation(item) => add_annotation(frame, item, &mut late),
             Item::PointLabels(_) => {}
@@ -155,7 +153,7 @@ fn draw_axes(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
 fn draw_line(drawing: &mut Drawing, frame: &Frame, line: &Line, late: &mut Vec<LateText>) {
     let points: Vec<_> = line.points.iter().map(|p| frame.px(*p)).collect();
     let stroke = Stroke { colour: line.colour, width_px: line.width_px, dash: line.dash };
-    let pieces = clip::polyline(&points, &frame.rect);
+    let pieces = contours::polyline(&points, &frame.rect);
     for piece in &pieces {
         drawing.polyline(piece, &stroke);
         if line.arrows {
@@ -181,7 +179,7 @@ fn draw_line(drawing: &mut Drawing, frame: &Frame, line: &Line, late: &mut Vec<L
 fn end_label_at(frame: &Frame, line: &Line) -> Option<(f64, f64)> {
     let (text, end) = line.end_label.as_ref()?;
     let points: Vec<_> = line.points.iter().map(|p| frame.px(*p)).collect();
-    let pieces = clip::polyline(&points, &frame.rect);
+    let pieces = contours::polyline(&points, &frame.rect);
     let ends = match end {
         LineEnd::First => pieces.first().map(|p| (p[1], p[0])),
         LineEnd::Last => pieces.last().map(|p| (p[p.len() - 2], p[p.len() - 1])),
@@ -231,7 +229,7 @@ fn draw_error_bar(
     scatter: &Scatter,
 ) {
     let stroke = Stroke::solid(scatter.colour, 1.1);
-    for piece in clip::polyline(&[low, high], &frame.rect) {
+    for piece in contours::polyline(&[low, high], &frame.rect) {
         drawing.polyline(&piece, &stroke);
         for end in [low, high].into_iter().filter(|end| frame.rect.contains(*end)) {
             let (dx, dy) = if along_x { (0.0, 3.0) } else { (3.0, 0.0) };
@@ -246,7 +244,7 @@ fn draw_rule(drawing: &mut Drawing, frame: &Frame, rule: &Rule) {
         RuleAt::X(value) => [(value, frame.y.low), (value, frame.y.high)],
     };
     let stroke = Stroke { colour: GREY, width_px: 1.2, dash: rule.dash };
-    for piece in clip::polyline(&ends.map(|p| frame.px(p)), &frame.rect) {
+    for piece in contours::polyline(&ends.map(|p| frame.px(p)), &frame.rect) {
         drawing.polyline(&piece, &stroke);
     }
 }
@@ -266,7 +264,7 @@ fn draw_contours(
         let share = i as f64 / (edges.len() - 2).max(1) as f64;
         let polygons: Vec<_> = band(&contours.grid, pair[0], pair[1])
             .into_iter()
-            .map(|p| clip::polygon(&p.into_iter().map(|p| frame.px(p)).collect::<Vec<_>>(), &frame.rect))
+            .map(|p| contours::polygon(&p.into_iter().map(|p| frame.px(p)).collect::<Vec<_>>(), &frame.rect))
             .collect();
         // Light enough that markers and texts stand out on the darkest.
         drawing.areas(&polygons, BLUE.tint(0.04 + 0.30 * share), 1.0);
@@ -276,7 +274,7 @@ fn draw_contours(
         let width = width_px(label, LABEL_PX);
         for chain in contour_lines(&contours.grid, *level) {
             let points: Vec<_> = chain.into_iter().map(|p| frame.px(p)).collect();
-            for piece in clip::polyline(&points, &frame.rect) {
+            for piece in contours::polyline(&points, &frame.rect) {
                 let Some(place) = place(&piece, width, obstacles) else {
                     drawing.polyline(&piece, &stroke);
                     continue;

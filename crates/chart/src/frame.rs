@@ -1,6 +1,6 @@
 //! Axes as drawn: round numbers for ticks and contour levels, and the frame with ticks and titles.
 
-use crate::clip::Rect;
+use crate::contours::Rect;
 use crate::items::{Item, RuleAt, Scatter};
 use crate::{Axis, Panel};
 

@@ -20,7 +20,6 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod clip;
 mod contours;
 mod draw;
 mod drawing;
@@ -32,7 +31,6 @@ mod layout;
 mod map_drawing;
 pub mod palette;
 mod png;
-mod point_labels;
 mod svg;
 mod text;
 

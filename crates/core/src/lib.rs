@@ -67,16 +67,14 @@ pub use measurement::jump::{
     jump_ratio,
 };
 pub use measurement::plausible::{
-    Implausible, Plausible, check_running, is_plausible_range, is_possible, is_reading, measurable, plausible,
+    COARSE_REPEAT_S, COARSE_REPEAT_SAMPLES, FaultKind, FrozenLimit, Implausible, NOISY_REPEAT_S, Plausible,
+    check_running, is_plausible_range, is_possible, is_reading, measurable, plausible, repeats,
 };
 pub use measurement::recording::{
     ChannelColumn, ElementColumn, Event, EventKind, Provenance, Quality, ReadingOrigin, Recording,
     RecordingError, SampleBatch, Series, StepMarker, TruthColumn,
 };
 pub use measurement::redundant::{DeclaredElement, Element, MAX_ELEMENTS, RedundantSensors, UnknownElement};
-pub use measurement::sensor_fault::{
-    COARSE_REPEAT_S, COARSE_REPEAT_SAMPLES, FaultKind, FrozenLimit, NOISY_REPEAT_S, repeats,
-};
 pub use rig::actuators::{ActuatorMotion, RigActuators};
 pub use rig::avoided_speeds::{AvoidedCrossing, AvoidedRange, AvoidedSpeeds, AvoidedTime};
 pub use rig::backend::{
@@ -89,11 +87,12 @@ pub use rig::guard::{
 };
 pub use rig::limits::{Limits, OnDrift, SURGE_ALLOWED_S, Soak, SpeedControlSettings, SpeedResponse};
 pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeNotFound, SurgeSearchSettings};
-pub use test_plan::plan::{Plan, PlanFigures, PlanInputHashes, PlanStep, Predicted, StepKind};
-pub use test_plan::plan_remark::{Advice, CampaignChange, PlanRemark, UndeclaredForecast, VerdictForecast};
+pub use test_plan::plan::{
+    Advice, CampaignChange, Plan, PlanFigures, PlanInputHashes, PlanRemark, PlanStep, Predicted, Ramp, Ramps,
+    StepKind, Transition, UndeclaredForecast, VerdictForecast,
+};
 pub use test_plan::points::{Dwell, Jump, OperatingPoint, Repeats, Timing, VisitOrder};
 pub use test_plan::step_number::step_number;
-pub use test_plan::transition::{Ramp, Ramps, Transition};
 pub use text::{
     coloured_text, one_line, probability_text, readable, shorten_numbers, temperature, terminal_json,
     terminal_text, with_unit,

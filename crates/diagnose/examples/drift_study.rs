@@ -18,7 +18,7 @@ use common::{Planted, campaign, draw, drift_reading, identification, judge, judg
 use mapper_core::{Channel, Method};
 use mapper_diagnose::drift::{Cause, RATE_PER_H, RateOrStep};
 use mapper_identify::{IdentifyConfig, identify_each};
-use mapper_inference::time_history::{Shape, TimeHistory};
+use mapper_inference::hypotheses::{Shape, TimeHistory};
 use std::collections::BTreeMap;
 
 const CAUSES: [Cause; 8] = [

@@ -1,8 +1,7 @@
 //! The files of an FMU: `modelDescription.xml` of the FMI standard, version 2.0, and their archive.
 
 use crate::header::{DEFAULT_TOLERANCE, header, number, with_guid};
-use crate::machine::{FmuError, FmuMachine};
-use crate::variables::{Causality, Switch, UNITS, Variable, switches, variables};
+use crate::variables::{Causality, FmuError, FmuMachine, Switch, UNITS, Variable, switches, variables};
 use quick_xml::escape::escape;
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;

@@ -1,9 +1,8 @@
 //! The numbers of a machine as a C header.
 
-use crate::machine::{FmuError, FmuMachine, FmuMap};
-use crate::variables::{Causality, Switch, Variable};
+use crate::variables::{Causality, FmuError, FmuMachine, FmuMap, Switch, Variable};
 use mapper_core::ReferenceState;
-use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
+use mapper_physics::compressor_map::closed_form_map::CompressorCharacteristic;
 use mapper_physics::compressor_map::tabulated_map::{Line, Node, TabulatedMap};
 use mapper_physics::gas::air;
 use mapper_physics::gas::mixture::{Gas, Virials};

@@ -9,8 +9,7 @@
 
 mod files;
 mod header;
-mod machine;
 mod variables;
 
 pub use files::{FmuFile, archive, files};
-pub use machine::{FmuError, FmuMachine, FmuMap, table_of_fit};
+pub use variables::{FmuError, FmuMachine, FmuMap, table_of_fit};

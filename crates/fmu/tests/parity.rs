@@ -3,8 +3,7 @@
 
 use mapper_core::{EfficiencyDefinition, InletConvection, ReferenceState};
 use mapper_fmu::{FmuMachine, FmuMap, files};
-use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
-use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
+use mapper_physics::compressor_map::closed_form_map::{ClosedFormMap, CompressorCharacteristic};
 use mapper_physics::compressor_map::tabulated_map::{MapRow, TabulatedMap};
 use mapper_physics::gas::mixture::{Fuel, Gas};
 use mapper_physics::machine::params::{BoundaryConditions, Params};

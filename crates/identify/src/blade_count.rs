@@ -3,7 +3,7 @@
 use crate::faults::nominal_rig::map_speed_rpm;
 use mapper_core::{IdentifiedPoint, ReferenceState};
 use mapper_numerics::statistics::{MIN_VALUES, median, quantile};
-use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
+use mapper_physics::compressor_map::closed_form_map::CompressorCharacteristic;
 
 /// Numbers of blades, splitters counted. Bound: wheels of turbochargers.
 const BLADES: std::ops::RangeInclusive<usize> = 4..=16;

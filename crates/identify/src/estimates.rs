@@ -6,7 +6,7 @@ use crate::faults::balances::standstill::standstills;
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
 use crate::joint::{DynamicEfficiency, Joint};
-use crate::reading_checks::failed_check::FailedCheck;
+use crate::reading_checks::ends::FailedCheck;
 use crate::single_step::dynamic::Estimate;
 use crate::single_step::steady;
 use crate::step_data::end_state::EndState;

@@ -1,7 +1,6 @@
 //! What each step of a recording shows on its own: its end state, its dynamic fit, and the checks that its readings fail.
 
-use crate::reading_checks::ends::Ends;
-use crate::reading_checks::failed_check::FailedCheck;
+use crate::reading_checks::ends::{Ends, FailedCheck};
 use crate::reading_checks::failed_checks;
 use crate::single_step::dynamic::{self, Estimate};
 use crate::step_data::end_state::{EndState, end_state};

@@ -16,4 +16,3 @@ pub mod interval;
 pub mod mixture;
 pub mod posterior;
 pub mod search;
-pub mod time_history;

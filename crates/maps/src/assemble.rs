@@ -1,12 +1,16 @@
-//! Assembles a compressor map from identified points, which it groups into speed lines.
+//! Assembles a map from points: repeated points become one, with one definition of efficiency.
 
-use crate::repeats::points_for_map;
 use mapper_core::{
-    CompressorMap, IdentifiedPoint, MapPoint, Method, ReferenceState, SpeedLine, SpeedShift, Verdict,
-    step_number, with_unit,
+    CompressorMap, EfficiencyDefinition, EstimateUncertainty, IdentifiedPoint, MapPoint, Method,
+    OperatingPoint, ReferenceState, SpeedLine, SpeedShift, StepKind, StepMarker, Verdict, step_number,
+    with_unit,
 };
 use mapper_numerics::statistics::range;
-use mapper_physics::compressor_map::characteristic::at_speed;
+use mapper_physics::compressor_map::closed_form_map::at_speed;
+use mapper_physics::gas::air::Air;
+use mapper_physics::gas::mixture::Gas;
+use mapper_physics::laws::compression::efficiency_by;
+use serde::Serialize;
 
 /// Assembles a map from identified points.
 ///
@@ -16,7 +20,7 @@ use mapper_physics::compressor_map::characteristic::at_speed;
 /// Points with a target form a line per target speed; points without one are grouped by gaps in corrected speed
 /// (`grouping.rs`). Lines come in order of mean corrected speed, their points in order of corrected flow (then of
 /// falling pressure ratio, for the vertical part at choke). Repeats for the detection of
-/// drift are left out unless the point itself has no efficiency (`repeats.rs`). An unusable point keeps
+/// drift are left out unless the point itself has no efficiency. An unusable point keeps
 /// flow and pressure ratio, without `eta`.
 ///
 /// `reference` is the reference state of the points' corrected quantities, `method` the method that identified all of them.
@@ -182,4 +186,134 @@ fn split<'a>(
         }
     }
     groups
+}
+
+/// Selects the points of the map, in their order: one for each planned point.
+///
+/// A point without a usable efficiency is replaced by the repeat of the same target with the best verdict and, among these, the smallest
+/// 95 % interval. The first point of a campaign has no jump before it, so only the joint method gives it an efficiency. If it is visited
+/// again for that reason, the better visit by the same rule counts: a mean would claim too small an interval, since the visits share errors.
+pub(crate) fn points_for_map(points: &[IdentifiedPoint]) -> Vec<IdentifiedPoint> {
+    let repeats = || {
+        points.iter().filter(|point| point.kind != StepKind::Point && point.target.is_some() && usable(point))
+    };
+    let order = |a: &&IdentifiedPoint, b: &&IdentifiedPoint| {
+        rank(a).cmp(&rank(b)).then(width(a).total_cmp(&width(b)))
+    };
+    points
+        .iter()
+        .filter(|point| point.kind == StepKind::Point)
+        .map(|point| {
+            let is_unusable = !usable(point);
+            repeats()
+                .filter(|other| {
+                    other.target == point.target && (is_unusable || other.kind == StepKind::Return)
+                })
+                .chain((!is_unusable).then_some(point))
+                .min_by(order)
+                .unwrap_or(point)
+                .clone()
+        })
+        .collect()
+}
+
+fn usable(point: &IdentifiedPoint) -> bool {
+    point.verdict != Verdict::Unusable && point.eta.is_some_and(f64::is_finite)
+}
+
+fn rank(point: &IdentifiedPoint) -> u8 {
+    u8::from(point.verdict != Verdict::Good)
+}
+
+/// Width of the interval; infinite without one.
+fn width(point: &IdentifiedPoint) -> f64 {
+    match (point.eta_low, point.eta_high) {
+        (Some(low), Some(high)) => high - low,
+        _ => f64::INFINITY,
+    }
+}
+
+/// A jump that the run made more than once.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RepeatedJump {
+    /// Start of the jump.
+    pub from: OperatingPoint,
+    /// Target of the jump.
+    pub to: OperatingPoint,
+    /// Indices of the steps, from 0; files have their numbers, from 1.
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
+    pub steps: Vec<usize>,
+    /// Efficiency of each step, fraction.
+    pub eta: Vec<f64>,
+    /// Last minus first efficiency, fraction.
+    pub eta_change: f64,
+    /// Standard error of this change from noise, fraction; fixed offsets cancel. `None` if an interval is missing.
+    pub eta_change_standard_error: Option<f64>,
+}
+
+/// Finds the repeated jumps, with the efficiency each time; a point that the same jump reached counts too.
+pub fn repeated_jumps(markers: &[StepMarker], points: &[IdentifiedPoint]) -> Vec<RepeatedJump> {
+    let mut jumps: Vec<(OperatingPoint, OperatingPoint)> = Vec::new();
+    for marker in markers.iter().filter(|marker| marker.kind == StepKind::Repeat) {
+        if let Some(jump) = marker.from.zip(marker.to).filter(|jump| !jumps.contains(jump)) {
+            jumps.push(jump);
+        }
+    }
+    jumps
+        .into_iter()
+        .filter_map(|(from, to)| {
+            let steps = markers.iter().filter(|marker| (marker.from, marker.to) == (Some(from), Some(to)));
+            let found: Vec<(&IdentifiedPoint, f64)> = steps
+                .filter_map(|marker| {
+                    let point = points.iter().find(|point| point.step == marker.index)?;
+                    Some((point, point.eta?))
+                })
+                .collect();
+            let ((first, first_eta), (last, last_eta)) = (found.first()?, found.last()?);
+            let noise = |point: &IdentifiedPoint| Some(point.eta_uncertainty?.noise_standard_error);
+            (found.len() > 1).then(|| RepeatedJump {
+                from,
+                to,
+                steps: found.iter().map(|(point, _)| point.step).collect(),
+                eta: found.iter().map(|(_, eta)| *eta).collect(),
+                eta_change: last_eta - first_eta,
+                eta_change_standard_error: noise(first)
+                    .zip(noise(last))
+                    .map(|(first, last)| first.hypot(last)),
+            })
+        })
+        .collect()
+}
+
+/// Converts the efficiencies of a map from the definition `from` to `to`, for equal temperatures of dry air from the map's reference
+/// state. Intervals and standard errors keep their ratio to the efficiency; a fitted surface is dropped.
+pub fn convert_efficiency(
+    mut map: CompressorMap,
+    from: EfficiencyDefinition,
+    to: EfficiencyDefinition,
+) -> CompressorMap {
+    if from != to {
+        let ReferenceState { t_ref_k, p_ref_pa } = map.reference;
+        let air = Air::new(Gas::air(), 0.0).with_efficiency(from);
+        for point in map.lines.iter_mut().flat_map(|line| &mut line.points) {
+            if let Some(eta) = point.eta.filter(|eta| *eta > 0.0 && point.pressure_ratio > 1.0) {
+                let air = air.between(p_ref_pa, point.pressure_ratio * p_ref_pa);
+                scale(point, efficiency_by(to, eta, point.pressure_ratio, t_ref_k, air) / eta);
+            }
+        }
+        map.fitted = None;
+    }
+    map.efficiency = Some(to);
+    map
+}
+
+fn scale(point: &mut MapPoint, ratio: f64) {
+    let identified = &mut point.identified;
+    let values = [&mut point.eta, &mut identified.eta, &mut identified.eta_low, &mut identified.eta_high];
+    values.into_iter().flatten().for_each(|value| *value *= ratio);
+    identified.eta_uncertainty = identified.eta_uncertainty.map(|uncertainty| EstimateUncertainty {
+        noise_standard_error: ratio * uncertainty.noise_standard_error,
+        bias_standard_error: ratio * uncertainty.bias_standard_error,
+    });
+    identified.common.eta_changes.iter_mut().for_each(|change| *change *= ratio);
 }

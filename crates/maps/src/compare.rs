@@ -1,6 +1,6 @@
 //! Compares two maps: differences in units, with their standard errors.
 
-use crate::efficiency_definition::convert_efficiency;
+use crate::assemble::convert_efficiency;
 use crate::map_fit::{MIN_FLOW_KG_S, MIN_RATIO_RANGE, MapFit, MapFitError, MapFitOptions};
 use mapper_core::{CompressorMap, FittedLine, FittedNode, confidence_interval_95};
 use mapper_numerics::polyline::NearestOnPolyline;

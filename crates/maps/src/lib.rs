@@ -8,19 +8,16 @@
 
 mod assemble;
 mod compare;
-mod efficiency_definition;
 mod line_ends;
 mod map_fit;
-mod repeats;
 pub mod table;
 mod turbine;
 
-pub use assemble::{AssembleError, assemble};
+pub use assemble::{AssembleError, RepeatedJump, assemble, convert_efficiency, repeated_jumps};
 pub use compare::{MapComparison, PlaceComparison, SpeedLineComparison, compare};
-pub use efficiency_definition::convert_efficiency;
 pub use line_ends::{DetectedEnd, LineEnds, mark_line_ends};
 pub use map_fit::{MapFit, MapFitError, MapFitOptions, NearestPlace, fit_map, leave_out};
-pub use repeats::{RepeatedJump, repeated_jumps};
 pub use turbine::turbine_compare::{TurbineComparison, TurbinePointComparison, compare_turbines};
-pub use turbine::turbine_fit::{ReducedTurbinePoint, reduce_turbine};
-pub use turbine::turbine_fit::{TurbineFit, TurbineFitError, fit_turbine};
+pub use turbine::turbine_fit::{
+    ReducedTurbinePoint, TurbineFit, TurbineFitError, fit_turbine, reduce_turbine,
+};

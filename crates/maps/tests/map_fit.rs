@@ -5,8 +5,7 @@
 use crate::support::{Row, map_of};
 use mapper_core::{CompressorMap, LeftOutLine};
 use mapper_maps::{MapFit, MapFitError, MapFitOptions, compare, fit_map, leave_out};
-use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
-use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
+use mapper_physics::compressor_map::closed_form_map::{ClosedFormMap, CompressorCharacteristic};
 
 /// A map as users have them (tests/data/LICENSE-sample).
 fn sample() -> CompressorMap {

@@ -14,7 +14,6 @@ pub const SLOPE_STEP: f64 = 6.055_454_452_393_343e-6;
 
 pub mod coloured_noise;
 pub mod least_squares;
-pub mod minimise;
 pub mod parallel;
 pub mod polyline;
 pub mod root;

@@ -1,7 +1,9 @@
-//! Mean readings over segments of a step, for the comparison of a recording with the model.
+//! Averages over a step, and the state at its start.
 
 use mapper_core::{Channel, Recording, Series};
 use mapper_numerics::statistics::{mean, median};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::{State, rad_s_of_rpm};
 use std::collections::BTreeMap;
 
 /// Distance of the end of a segment before a jump, s: a sample at the jump belongs to the segment after it. Bound: above the rounding of
@@ -173,6 +175,60 @@ pub fn blocks(table: &Table, start_s: f64, end_s: f64, schedule: &Schedule) -> V
 /// Mean of a channel in a block; `None` if samples are missing.
 pub fn block_mean(values: &[f64], block: &Block) -> Option<f64> {
     mean_reading(&values[block.samples.clone()])
+}
+
+/// Shaft speed, rpm. Bound: a start value; the steady state does not depend on it.
+const USUAL_RPM: f64 = 90e3;
+/// Minimum shaft speed, rpm. Bound: the model divides by it.
+const MIN_RPM: f64 = 1e3;
+/// Pressure ratio. Bound: a start value.
+const USUAL_PRESSURE_RATIO: f64 = 1.5;
+/// Rise of the compressor housing above the inlet, K. Bound: a start value.
+const USUAL_HOUSING_RISE_K: f64 = 40.0;
+/// Rise of the gas, K. Bound: a start value.
+const USUAL_RISE_K: f64 = 50.0;
+
+/// The state given by readings; `read` returns the mean of a channel. Missing readings are replaced by typical values of a turbocharger under
+/// the boundary conditions, which suffice because the steady state does not depend on them.
+pub fn estimate_state(boundary: &BoundaryConditions, read: impl Fn(Channel) -> Option<f64>) -> State {
+    let read_or = |channel: Channel, usual: f64| read(channel).unwrap_or(usual);
+    State::new(
+        rad_s_of_rpm(read_or(Channel::ShaftSpeed, USUAL_RPM).max(MIN_RPM)),
+        read_or(Channel::P2, USUAL_PRESSURE_RATIO * boundary.p1_pa).max(boundary.p1_pa),
+        read_or(Channel::Tc, boundary.t1_k + USUAL_HOUSING_RISE_K),
+        read_or(Channel::Tt, 0.5 * (boundary.t3_k + boundary.t1_k)),
+        read_or(Channel::T2, boundary.t1_k + USUAL_RISE_K),
+    )
+}
+
+/// Outputs of the model that a sensor measures. P3 is a boundary condition and is compared only if its lag matters.
+pub const OUTPUTS: [Channel; 8] = [
+    Channel::ShaftSpeed,
+    Channel::P2,
+    Channel::CompressorFlow,
+    Channel::TurbineFlow,
+    Channel::T2,
+    Channel::Tc,
+    Channel::Tt,
+    Channel::T4,
+];
+
+/// Recorded boundary conditions that drive the model.
+pub const INPUT_CHANNELS: [Channel; 6] =
+    [Channel::T1, Channel::P1, Channel::P3, Channel::T3, Channel::P4, Channel::TOil];
+
+/// The boundary condition that a channel measures; `None` for channels that are not inputs.
+pub fn boundary_condition(boundary: &mut BoundaryConditions, channel: Channel) -> Option<&mut f64> {
+    match channel {
+        Channel::T1 => Some(&mut boundary.t1_k),
+        Channel::P1 => Some(&mut boundary.p1_pa),
+        Channel::P3 => Some(&mut boundary.p3_pa),
+        Channel::T3 => Some(&mut boundary.t3_k),
+        Channel::P4 => Some(&mut boundary.p4_pa),
+        Channel::TOil => Some(&mut boundary.oil_temperature_k),
+        Channel::TAmb => Some(&mut boundary.ambient_temperature_k),
+        _ => None,
+    }
 }
 
 #[cfg(test)]

@@ -7,19 +7,14 @@
 
 pub mod acceptance;
 pub mod averages;
-pub mod channels;
 pub mod declared;
 pub mod energy_balance;
-pub mod initial_state;
 mod measured_stand;
 pub mod model_inputs;
 pub mod perturbation;
 pub mod redundant_sensors;
-pub mod same_machine;
-pub mod total_pressure;
 
 pub use declared::{Declared, declared_uncertainties};
-pub use measured_stand::{Fitted, MeasuredValue, measure_actuators};
+pub use measured_stand::{Fitted, MeasuredValue, OtherMachine, measure_actuators, same_machine};
 pub use redundant_sensors::element_fault::{Contradiction, ElementFault, FaultyElement, FusedChannel};
 pub use redundant_sensors::fuse::{fuse, judge_elements};
-pub use same_machine::{OtherMachine, same_machine};

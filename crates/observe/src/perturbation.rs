@@ -1,6 +1,6 @@
 //! Possible differences between a recording and the model: one quantity of machine, inputs or initial state, and its adjustment.
 
-use crate::channels::boundary_condition;
+use crate::averages::boundary_condition;
 use mapper_core::{Channel, ModelTolerances};
 use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::simulation::model::State;
@@ -141,7 +141,7 @@ mod tests {
             seen.push(params);
         }
         let mut boundary = BoundaryConditions::default();
-        for channel in crate::channels::INPUT_CHANNELS {
+        for channel in crate::averages::INPUT_CHANNELS {
             let before = boundary;
             Perturbation::Input(channel).adjust_boundary(&mut boundary, 1.0);
             assert_ne!(boundary, before, "{channel}");

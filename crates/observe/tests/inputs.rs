@@ -7,7 +7,7 @@ use mapper_observe::averages::Table;
 use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::simulation::steady::Inputs;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;

@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::simulation::inputs::{InputsError, InterpolatedInputs};
 use mapper_physics::simulation::model::{Model, State};
 use mapper_physics::simulation::simulate::{Crossing, ModelEvent, Simulator, Watch};
 use mapper_physics::simulation::steady;
+use mapper_physics::simulation::steady::{InputsError, InterpolatedInputs};
 
 fn held(speed_rpm: f64, valve_opening_ratio: f64) -> steady::SteadyState {
     let boundary = BoundaryConditions { valve_opening_ratio, ..Default::default() };

@@ -19,15 +19,13 @@ mod plan_builder;
 mod request;
 mod search;
 mod visits;
-mod walk;
 
 pub use jump_forecast::{JumpForecast, explain_jump, forecast_all_jumps};
 pub use jump_graph::{Rejection, SeparatePoints};
 pub use plan::{make_plan, plan_other_orders};
-pub use plan_builder::max_steps;
+pub use plan_builder::{STABLE_DRIFT_K_MIN, max_steps};
 pub use request::{
     ForecastRow, MethodResult, MethodResults, PlanError, PlanRequest, PredictedMethod, UnreachablePoint,
     hash_inputs, sha256_hex,
 };
 pub use search::{Effort, search};
-pub use walk::STABLE_DRIFT_K_MIN;

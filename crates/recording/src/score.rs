@@ -3,7 +3,7 @@
 //! Code that identifies, corrects or diagnoses must not use this module; a test of the source tree lists its users.
 
 use crate::logs::LogFile;
-use crate::mcap::records::{ChannelDefinition, FieldValue, Sink, read_fields};
+use crate::mcap::{ChannelDefinition, FieldValue, Sink, read_fields};
 use crate::reading::log_reader::is_mcap;
 use crate::reading::recording_reader::open;
 use crate::reading::scan::scan;

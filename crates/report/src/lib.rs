@@ -34,10 +34,12 @@ pub use nights::{listed_run_json, listed_runs, night_comparison, night_groups};
 pub use page::run_page::gap_page;
 pub use page::widgets::OtherRun;
 pub use pictures::{distinct_names, error_figure, heat_transfer_figure, history_svg, map_comparison_figure};
-pub use plan::campaign_check::CheckedCampaign;
-pub use plan::commissioning::{commissioning_document, commissioning_json, values_to_declare};
-pub use plan::plan_document::plan_svg;
-pub use plan::plan_document::{comparison_json, jump_forecast, jump_json, plan_comparison, plan_document};
+pub use plan::campaign_check::{
+    CheckedCampaign, commissioning_document, commissioning_json, values_to_declare,
+};
+pub use plan::plan_document::{
+    comparison_json, jump_forecast, jump_json, plan_comparison, plan_document, plan_svg,
+};
 pub use plan::plan_remark_text::guard_trip_text;
 pub use point_results::budget_table::budget_csv;
 pub use point_results::summary::PointResults;

@@ -19,7 +19,7 @@ mod tests {
     use super::*;
     use crate::testing::Instant;
     use mapper_core::ReferenceState;
-    use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+    use mapper_physics::compressor_map::closed_form_map::{CharacteristicPoint, CompressorCharacteristic};
     use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
 
     /// At 110 krpm the flow of best efficiency is below the flow of the point: more flow is less efficient, by the closed form's own

@@ -40,7 +40,7 @@ fn readings(rig: &Rig) -> Vec<f64> {
     };
     let row = |t_s: &f64| BoundaryConditions { p3_pa: p3_pa(*t_s), valve_opening_ratio: opening(*t_s), ..to };
     let rows = times.iter().map(row).collect();
-    let inputs = mapper_physics::simulation::inputs::InterpolatedInputs::new(times, rows).unwrap();
+    let inputs = mapper_physics::simulation::steady::InterpolatedInputs::new(times, rows).unwrap();
     let measured: Vec<Channel> = CHANNELS[..15].iter().map(|row| row.channel).collect();
     let mut followers: Vec<ChannelFollower> =
         measured.iter().map(|channel| ChannelFollower::new(*rig.instruments.path(*channel))).collect();
@@ -52,7 +52,7 @@ fn readings(rig: &Rig) -> Vec<f64> {
             &inputs,
             (0..=60).map(f64::from),
             |t_s, state, outputs| {
-                use mapper_physics::simulation::inputs::Inputs;
+                use mapper_physics::simulation::steady::Inputs;
                 let boundary = inputs.at(t_s);
                 let prepared = rig.model.prepare(&boundary);
                 for (channel, follower) in measured.iter().zip(&mut followers) {

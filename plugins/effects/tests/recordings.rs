@@ -4,10 +4,10 @@
 
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::effect::{self, Rig};
-use mapper_physics::simulation::inputs::InterpolatedInputs;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::{Simulator, Watch};
 use mapper_physics::simulation::steady;
+use mapper_physics::simulation::steady::InterpolatedInputs;
 
 /// Rows of numbers below a header line.
 fn table(name: &str) -> Vec<Vec<f64>> {
@@ -55,7 +55,7 @@ fn inputs(means: &[Vec<f64>], commands: &[Vec<f64>]) -> InterpolatedInputs {
 
 /// Scatter of recorded minus simulated means of 10 s, after removal of its mean (an offset), of speed, P2, T2 and Tc.
 fn scatter(rig: &Rig, means: &[Vec<f64>], inputs: &InterpolatedInputs) -> [f64; 4] {
-    use mapper_physics::simulation::inputs::Inputs;
+    use mapper_physics::simulation::steady::Inputs;
     let start = steady::settle_under(&rig.model, &inputs.at(0.0)).unwrap();
     let mut simulator = Simulator::new(&rig.model, 0.0, start.state, 1e-6, Watch::default());
     let mut sums = vec![[0.0; 4]; means.len()];

@@ -44,7 +44,7 @@ prop_compose! {
             if i % 6 == 0 { speed *= 1.0 + steps[(i / 6) % steps.len()]; }
             let own = speed * (1.0 + drift * (i % 3) as f64);
             // Below the maximum flow of an inlet, at all reference states.
-            let flow = flow.min(0.4 * mapper_physics::compressor_map::characteristic::max_flow_kg_s(own));
+            let flow = flow.min(0.4 * mapper_physics::compressor_map::closed_form_map::max_flow_kg_s(own));
             let _ = writeln!(text, "{own},{flow},{ratio},{}", eta.map_or(String::new(), |eta| eta.to_string()));
         }
         let head = "rpm,wc,pr,eta\n".to_owned();

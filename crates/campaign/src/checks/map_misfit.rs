@@ -1,12 +1,18 @@
-//! Compares a nominal map with the compressor's wheel, to find columns in another unit or in another order.
+//! Compares the nominal map with the wheel, and the grid with what the machine reaches.
 
-use crate::checks::reachable_points::to_mm;
-use mapper_core::ReferenceState;
-use mapper_physics::compressor_map::characteristic::{CompressorCharacteristic, head_ratio};
-use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
+use crate::campaign::Campaign;
+use crate::checking::{Check, Files};
+use crate::elements;
+use crate::elements::turbocharger::machine::NominalTableError;
+use mapper_core::{OperatingPoint, ReferenceState};
+use mapper_physics::compressor_map::closed_form_map::{ClosedFormMap, CompressorCharacteristic, head_ratio};
 use mapper_physics::compressor_map::tabulated_map::TabulatedMap;
 use mapper_physics::gas::air;
+use mapper_physics::operating_point::reach::{describe_obstacles, reach};
+use mapper_physics::simulation::model::Model;
+use mapper_yaml::{Notes, Step, Tree};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Maximum ratio, either way, of a compressor's choke flow to the scaled reference machine's at equal tip speed. Confused units differ by
 /// more: lb/min and kg/s by 132, g/s and kg/s by 1000.
@@ -123,4 +129,90 @@ fn large_or_small(found: f64, usual: f64) -> &'static str {
 pub(crate) fn two_digits(value: f64) -> String {
     let digits = (1.0 - value.abs().log10().floor()).max(0.0);
     if digits > 4.0 { format!("{value:.1e}") } else { format!("{value:.*}", digits as usize) }
+}
+
+/// A point that cannot be measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UnreachablePoint {
+    /// Index in [`Campaign::points`].
+    pub point: usize,
+    /// Reason, with values and units.
+    pub reason: String,
+    /// The remedy.
+    pub remedy: String,
+    /// Key of the limit below `limits` that is in the way, if one is.
+    pub limit: Option<&'static [&'static str]>,
+}
+
+/// The nominal model of a campaign, on its map.
+///
+/// # Errors
+/// [`NominalTableError`] if the map file's text is not a map; this cannot happen in a checked campaign.
+pub fn nominal_model(campaign: &Campaign) -> Result<Model, NominalTableError> {
+    let params = campaign.machine.params;
+    let map: Arc<dyn CompressorCharacteristic> = match campaign.machine.map.table() {
+        None => Arc::new(ClosedFormMap { wheel_diameter_m: params.compressor.wheel_diameter_m }),
+        Some(table) => Arc::new(table?),
+    };
+    Ok(Model::new(params, map))
+}
+
+/// The points that cannot be measured, each with all reasons; see [`mapper_physics::operating_point::reach`].
+pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<UnreachablePoint> {
+    let check_point = |(index, point): (usize, &OperatingPoint)| {
+        let (boundary, limits) = (&campaign.boundary, &campaign.limits);
+        let obstacles = reach(model, *point, boundary, campaign.follow_outlet, limits).err()?;
+        let (krpm, opening) = point.shown();
+        let krpm = (krpm * 1e2).round() / 1e2;
+        Some(UnreachablePoint {
+            point: index,
+            reason: format!("{krpm} krpm at opening {opening} {}", describe_obstacles(&obstacles)),
+            remedy: obstacles.first()?.remedy().to_owned(),
+            limit: obstacles.first()?.limit(),
+        })
+    };
+    campaign.points.iter().enumerate().filter_map(check_point).collect()
+}
+
+/// Checks everything that needs more than one value.
+pub(crate) fn check_consistency(tree: &Tree, files: Files<'_>, notes: &mut Notes) {
+    let mut check = Check { tree, files, notes };
+    elements::rig::backend::check(&mut check);
+    elements::rig::limits::check(&mut check);
+    elements::rig::guards::check(&mut check);
+    elements::identification::check(&mut check);
+    elements::timing::check(&mut check);
+    elements::repeats::check_repeats(&mut check);
+    elements::rig::sensors::check(&mut check);
+    elements::output::check(&mut check);
+    elements::turbocharger::machine::check(&mut check);
+    elements::turbocharger::gas::check(&mut check);
+    elements::repeats::check_sequence(&mut check);
+    elements::grid::check(&mut check);
+}
+
+/// An unusual or impossible setting of a campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Concern {
+    /// Whether it is an error, so that the campaign cannot run; otherwise a warning.
+    pub is_error: bool,
+    /// The key, as a path.
+    pub at: Vec<Step>,
+    /// Description, with values and units.
+    pub message: String,
+    /// The remedy.
+    pub remedy: String,
+}
+
+impl Concern {
+    /// A warning at the key with this path.
+    pub fn warning(path: &[&str], message: String, remedy: String) -> Self {
+        let at = path.iter().map(|key| Step::from(*key)).collect();
+        Concern { is_error: false, at, message, remedy }
+    }
+}
+
+/// A length in mm, rounded to 0.1 um.
+pub(crate) fn to_mm(length_m: f64) -> f64 {
+    (1e7 * length_m).round() / 1e4
 }

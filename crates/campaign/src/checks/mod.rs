@@ -1,6 +1,4 @@
 //! Checks of a campaign beyond its schema: consistency of values, reachable points, and warnings about unusual values.
 
-pub(crate) mod calibration;
 pub(crate) mod map_misfit;
-pub(crate) mod reachable_points;
 pub(crate) mod unusual_settings;

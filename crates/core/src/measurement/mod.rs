@@ -6,4 +6,3 @@ pub(crate) mod jump;
 pub(crate) mod plausible;
 pub(crate) mod recording;
 pub(crate) mod redundant;
-pub(crate) mod sensor_fault;

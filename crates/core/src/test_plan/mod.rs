@@ -1,7 +1,5 @@
 //! The plan that planner and runner exchange: operating points, jumps, their order and durations, and expected verdicts.
 
 pub(crate) mod plan;
-pub(crate) mod plan_remark;
 pub(crate) mod points;
 pub mod step_number;
-pub(crate) mod transition;

@@ -6,7 +6,7 @@ use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use mapper_core::Channel;
-use mapper_numerics::least_squares::descent::DifferenceStep;
+use mapper_numerics::least_squares::DifferenceStep;
 use mapper_numerics::{ROUNDING, parallel};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;

@@ -5,12 +5,10 @@ use crate::closure::columns::{Base, Products};
 use crate::closure::description::{ClosureDescription, describe, script_of};
 use crate::closure::library as term_library;
 use crate::closure::residual_source::{ResidualSource, residual_sources};
-use crate::closure::select::{Choice, begun, choices};
-use crate::closure::select::{FittedClosure, TermSearch, keep_determined, promising};
-use crate::gap::best_fit::adequacy::{adequacy, misfit_of_steps};
-use crate::gap::best_fit::fit::{Effort, Fit, fit, with_start_read};
+use crate::closure::select::{Choice, FittedClosure, TermSearch, begun, choices, keep_determined, promising};
+use crate::gap::best_fit::fit::{Effort, Fit, adequacy, fit, misfit_of_steps, with_start_read};
 use crate::gap::best_fit::normal::Selection;
-use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::place::{
     Explanation, Gain, LINEARISATION_ERROR_RATIO, Part, of_fits, places_of, rarity, signature,
 };

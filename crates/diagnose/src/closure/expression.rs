@@ -1,6 +1,6 @@
 //! Formulas of machine quantities that can be both evaluated and written as script.
 
-use mapper_inference::time_history::{Shape, TimeHistory};
+use mapper_inference::hypotheses::{Shape, TimeHistory};
 use mapper_physics::machine::hooks::Site;
 use std::fmt::{Display, Formatter, Result};
 

@@ -8,11 +8,11 @@ use crate::closure::columns::{Base, Posterior, Products, weigh_process};
 use crate::closure::expression::{DECAY, Expression, Span, Spans};
 use crate::closure::term::{Role, Term};
 use crate::gap::residuals::nuisance::OUTPUTS;
-use crate::gap::residuals::point_state::PointState;
+use crate::gap::residuals::prediction::PointState;
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::rows_of_step;
 use mapper_core::Channel;
-use mapper_inference::time_history::{Shape, TimeHistory};
+use mapper_inference::hypotheses::{Shape, TimeHistory};
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector};
 

@@ -11,7 +11,7 @@ use crate::gap::findings::report::MAX_EQUIVALENT;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::step_number;
-use mapper_inference::time_history::Shape;
+use mapper_inference::hypotheses::Shape;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::HINT_SIGMAS;
 use mapper_physics::rig::effect::Effect;

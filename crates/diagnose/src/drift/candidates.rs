@@ -3,8 +3,7 @@
 use crate::drift::causes::{Cause, RATE_PER_H};
 use crate::drift::readings::{Readings, Response};
 use crate::drift::runs::Unsolvable;
-use mapper_inference::hypotheses::{Hypothesis, Likelihood, Priors};
-use mapper_inference::time_history::{Shape, TimeHistory};
+use mapper_inference::hypotheses::{Hypothesis, Likelihood, Priors, Shape, TimeHistory};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Prior probability of a drift in a campaign. Bound: repeats are made if drift is expected; equal odds.

@@ -2,8 +2,8 @@
 
 use mapper_core::unit_factors::S_PER_H;
 use mapper_core::{Channel, Dimension, with_unit};
-use mapper_inference::time_history::{Shape, TimeHistory};
-use mapper_observe::channels::INPUT_CHANNELS;
+use mapper_inference::hypotheses::{Shape, TimeHistory};
+use mapper_observe::averages::INPUT_CHANNELS;
 use mapper_observe::perturbation::Perturbation;
 use mapper_physics::laws::turbine::at_150_krpm;
 use mapper_physics::machine::params::{BoundaryConditions, Params};

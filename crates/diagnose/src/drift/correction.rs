@@ -8,8 +8,7 @@ use crate::drift::runs::{CampaignStep, DriftRequest, mean_variance_ratio};
 use mapper_core::unit_factors::{PA_PER_KPA, RPM_PER_KRPM};
 use mapper_core::{Channel, IdentifiedPoint, Recording};
 use mapper_identify::identify_each;
-use mapper_observe::averages::mean_between;
-use mapper_observe::channels::OUTPUTS;
+use mapper_observe::averages::{OUTPUTS, mean_between};
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 

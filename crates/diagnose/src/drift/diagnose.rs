@@ -4,8 +4,7 @@ use crate::drift::causes::{Cause, CauseKind, Drift};
 use crate::drift::correction::{corrected_points, group, identified};
 use crate::drift::drive::{Drive, predict};
 use crate::drift::readings::{Readings, Response, SegmentMeans};
-use crate::drift::refinement::{Decision, DetectedCause};
-use crate::drift::refinement::{FittedDrift, Refinement};
+use crate::drift::refinement::{Decision, DetectedCause, FittedDrift, Refinement};
 use crate::drift::report::{DriftReport, DriftVerdict, FoundDrift, RateOrStep};
 use crate::drift::runs;
 use crate::drift::runs::{
@@ -14,9 +13,9 @@ use crate::drift::runs::{
 use crate::gap::residuals::true_inputs::SETTLING_S;
 use crate::gap::residuals::whiten::NEAR_SURGE;
 use mapper_core::{Channel, IdentifiedPoint, Recording, probability_text};
-use mapper_inference::time_history::Shape;
+use mapper_inference::hypotheses::Shape;
 use mapper_numerics::statistics::mean;
-use mapper_observe::channels::{INPUT_CHANNELS, OUTPUTS};
+use mapper_observe::averages::{INPUT_CHANNELS, OUTPUTS};
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 use nalgebra::DMatrix;

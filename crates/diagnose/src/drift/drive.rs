@@ -4,16 +4,14 @@ use crate::drift::causes::Drift;
 use crate::drift::runs::{CampaignStep, DriftError, DriftRequest, SEGMENTS, Segment};
 use mapper_core::{Channel, Dimension, Recording};
 use mapper_numerics::parallel;
-use mapper_observe::averages::{BEFORE_S, mean_between};
-use mapper_observe::channels::OUTPUTS;
-use mapper_observe::initial_state::estimate_state;
+use mapper_observe::averages::{BEFORE_S, OUTPUTS, estimate_state, mean_between};
 use mapper_observe::model_inputs::averaged_inputs::AveragedInputs;
 use mapper_observe::perturbation::Perturbation;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::true_value;
 use mapper_physics::simulation::driven::{DriveError, FrozenGrid, drive, settle};
-use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::{Model, State};
+use mapper_physics::simulation::steady::Inputs;
 
 /// Interval of model readings within a segment, s. Bound: four in the shortest segment; housings hardly move within it.
 const SAMPLE_S: f64 = 2.5;

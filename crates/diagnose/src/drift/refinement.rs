@@ -3,15 +3,13 @@
 use crate::drift::candidates::{Candidates, FINE_ONSETS, LowRank, time_histories};
 use crate::drift::causes::{Cause, Drift};
 use crate::drift::drive::{Drive, predict};
-use crate::drift::readings::constants;
-use crate::drift::readings::{Readings, Response};
+use crate::drift::readings::{Readings, Response, constants};
 use crate::drift::report::{Alternative, DetectionLimit};
 use crate::drift::runs::{DriftError, Unsolvable};
 use mapper_core::unit_factors::S_PER_H;
-use mapper_inference::hypotheses::Member;
+use mapper_inference::hypotheses::{Member, Shape, TimeHistory};
 use mapper_inference::posterior::shares;
-use mapper_inference::time_history::{Shape, TimeHistory};
-use mapper_numerics::least_squares::descent::{ENOUGH, ROUNDS};
+use mapper_numerics::least_squares::{ENOUGH, ROUNDS};
 use mapper_numerics::statistics::{CHI_SQUARE_1_95, EXCLUDE_SIGMAS, NORMAL_975, median};
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::UNINFORMATIVE;

@@ -1,7 +1,7 @@
 //! The report, printed and written as JSON.
 
 use crate::drift::causes::{Cause, RATE_PER_H};
-use mapper_inference::time_history::{Shape, TimeHistory};
+use mapper_inference::hypotheses::{Shape, TimeHistory};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

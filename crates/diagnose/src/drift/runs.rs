@@ -8,12 +8,11 @@ use mapper_core::{
 use mapper_identify::{IdentifyConfig, LONGEST_BRIDGE_S};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_numerics::statistics::median;
-use mapper_observe::averages::{BEFORE_S, Schedule, mean_between};
-use mapper_observe::channels::{INPUT_CHANNELS, OUTPUTS};
+use mapper_observe::averages::{BEFORE_S, INPUT_CHANNELS, OUTPUTS, Schedule, mean_between};
 use mapper_observe::declared::Declared;
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::simulation::inputs::InputsError;
 use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::steady::InputsError;
 use std::collections::BTreeMap;
 
 /// Minimum number of visits by one jump. Bound: two show a difference, a third shows whether it persists or grows.

@@ -1,9 +1,8 @@
 //! Compressor side of the model with all effects. Flow is measured and efficiency is fitted; the map is not used.
 
-use crate::driven::log_rows::{Rows, SideChannels, does_work};
 use crate::driven::side::{
-    CORRELATION_S, HOUSING_CORRELATION_S, ModelError, Parameter, Side, SideModel, log_normal, normal,
-    relaxed_k, true_drive,
+    CORRELATION_S, HOUSING_CORRELATION_S, ModelError, Parameter, Rows, Side, SideChannels, SideModel,
+    does_work, log_normal, normal, relaxed_k, true_drive,
 };
 use mapper_core::{Channel, SAMPLE_INTERVAL_S};
 use mapper_identify::EFFICIENCY;

@@ -2,17 +2,14 @@
 
 use crate::driven::DrivenError;
 use crate::driven::compressor::CompressorSide;
-use crate::driven::denoise::denoised;
 use crate::driven::fit::{SideFit, SideProblem};
 use crate::driven::held_out::{beyond, held_out, phases, residual_rms_k};
-use crate::driven::log_rows::Rows;
-use crate::driven::search::{diagnosable, smallest};
-use crate::driven::search::{probabilities, search};
-use crate::driven::side::{Side, SideModel};
+use crate::driven::search::{diagnosable, probabilities, search, smallest};
+use crate::driven::side::{Rows, Side, SideModel, denoised};
 use crate::driven::side_diagnosis::{ChannelTrace, Diagnosis, SideCause, SideVerdict, Unknown};
 use crate::driven::turbine::TurbineSide;
 use crate::gap::best_fit::coordinate::infos;
-use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::{candidate, name_of};
 use crate::gap::findings::report::{EXCLUDED, MAX_EQUIVALENT};
 use mapper_core::{Channel, Recording};

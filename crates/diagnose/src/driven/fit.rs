@@ -11,10 +11,10 @@ use crate::gap::best_fit::fit::MAX_SIGMAS;
 use crate::gap::best_fit::normal::PRIOR_STEPS;
 use crate::gap::residuals::study::Hypothesis;
 use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
-use mapper_numerics::least_squares::descent::{
+use mapper_numerics::least_squares::{
     DifferenceStep, End, FINE, Model, Normal, Until, descend, step_bounds_within,
 };
-use mapper_numerics::minimise::minimise;
+use mapper_numerics::root::minimise;
 use mapper_numerics::statistics::HINT_SIGMAS;
 use mapper_physics::rig::effect::{Effect, Rig, add};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};

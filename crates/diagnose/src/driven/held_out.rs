@@ -1,12 +1,11 @@
 //! Phases of a log, and the gap reduction on held-out data: phase by phase, and after the fitted part.
 
 use crate::driven::fit::{Columns, SideFit, SideProblem};
-use crate::driven::log_rows::Rows;
 use crate::driven::search::weight;
-use crate::driven::side::SideModel;
+use crate::driven::side::{Rows, SideModel};
 use crate::driven::side_diagnosis::{Beyond, HeldOut, Phase};
 use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, unknowns};
-use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::ids;
 use mapper_core::Channel;
 use mapper_inference::mixture::DRAWS;

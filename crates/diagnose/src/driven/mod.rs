@@ -7,11 +7,9 @@
 //! Every parameter has a wide prior and an interval: a log of 13 s cannot distinguish a slow probe from a warm housing, and the result must show this.
 
 pub(crate) mod compressor;
-mod denoise;
 mod diagnose;
 mod fit;
 mod held_out;
-mod log_rows;
 mod search;
 pub(crate) mod side;
 mod side_diagnosis;

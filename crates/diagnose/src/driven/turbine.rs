@@ -1,10 +1,9 @@
 //! Turbine side of the model. Flow, pressures and speed are measured; efficiency, heat transfer and housing are free parameters.
 
 use crate::driven::compressor::MIN_FLOW_KG_S;
-use crate::driven::log_rows::{Rows, SideChannels, does_work};
 use crate::driven::side::{
-    CORRELATION_S, HOUSING_CORRELATION_S, ModelError, Parameter, Side, SideModel, log_normal, normal,
-    relaxed_k, true_drive,
+    CORRELATION_S, HOUSING_CORRELATION_S, ModelError, Parameter, Rows, Side, SideChannels, SideModel,
+    does_work, log_normal, normal, relaxed_k, true_drive,
 };
 use mapper_core::Channel;
 use mapper_physics::laws::housing::turbine_capacity_j_k;

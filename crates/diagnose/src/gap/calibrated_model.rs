@@ -2,21 +2,19 @@
 
 use crate::gap::best_fit::coordinate::{coordinates, infos};
 use crate::gap::best_fit::fit::{changes_near, effect_changes};
-use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::additions::Calibration;
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::findings::report::Verdict;
-use crate::gap::next_experiment::outlook::{SimulatedRig, simulated_steps};
-use crate::gap::preconditions::GapError;
-use crate::gap::prepare::Prepared;
+use crate::gap::next_experiment::{SimulatedRig, simulated_steps};
+use crate::gap::preconditions::{GapError, Prepared};
 use crate::gap::request::RigRecording;
-use crate::gap::residuals::machine_run::LinearisedMachine;
 use crate::gap::residuals::nuisance::{Nuisance, OFFSET_PREFIX, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
-use crate::gap::residuals::true_inputs::Actuators;
+use crate::gap::residuals::true_inputs::{Actuators, LinearisedMachine};
 use crate::gap::residuals::whiten::{Linearised, dot, nuisance_changes};
 use mapper_core::{Channel, half_width_95};
 use mapper_identify::BLOCK_S;
-use mapper_numerics::least_squares::descent::FINE;
+use mapper_numerics::least_squares::FINE;
 use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_physics::rig::effect::Effect;
 use nalgebra::{DMatrix, DVector};

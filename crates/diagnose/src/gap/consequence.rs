@@ -12,10 +12,10 @@ use mapper_core::{
     BudgetRow, Channel, IdentifiedPoint, PointBudgets, Recording, Series, UncertaintyBudget, half_width_95,
     step_number,
 };
-use mapper_observe::channels::{INPUT_CHANNELS, boundary_condition};
+use mapper_observe::averages::{INPUT_CHANNELS, boundary_condition};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::effect::{EffectError, Rig};
-use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::simulation::steady::Inputs;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -2,20 +2,16 @@
 
 use crate::closure::discover::{Discovered, discover};
 use crate::drift::DriftReport;
-use crate::gap::best_fit::adequacy::Adequacy;
-use crate::gap::best_fit::fit::Fit;
-use crate::gap::causes::calibration::Calibration;
-use crate::gap::causes::probabilities::{Posterior, rivals, suspicions, weight};
-use crate::gap::causes::smallest_seen::smallest_seen;
-use crate::gap::findings::experiment::Experiment;
+use crate::gap::best_fit::fit::{Adequacy, Fit};
+use crate::gap::causes::additions::Calibration;
+use crate::gap::causes::probabilities::{Posterior, rivals, smallest_seen, suspicions, weight};
+use crate::gap::findings::experiment::{Experiment, GapWarning};
 use crate::gap::findings::report::{Diagnosis, Gap, Next, Place, Verdict};
-use crate::gap::findings::warning::GapWarning;
 use crate::gap::gap_reduction::{Compared, beyond_prior, held_out_gap};
 use crate::gap::library_fits::LibraryFits;
 use crate::gap::model_error::baseline::Baseline;
-use crate::gap::next_experiment::best_experiment::{Suggested, next, sensor_near};
-use crate::gap::preconditions::{GapError, another_machine, assumed, checked_study};
-use crate::gap::prepare::{Prepared, is_of_sensors};
+use crate::gap::next_experiment::{Suggested, next, sensor_near};
+use crate::gap::preconditions::{GapError, Prepared, another_machine, assumed, checked_study, is_of_sensors};
 use crate::gap::request::{BaselineRecording, ClosureSearch, GapRequest, RigRecording};
 use crate::gap::residuals::study::{Hypothesis, Prediction, Study, members};
 use crate::gap::residuals::whiten::Linearised;

@@ -1,7 +1,6 @@
 //! The gap before and after a cause, on steps that were not used to fit it.
 
-use crate::gap::best_fit::adequacy::misfit_of_steps;
-use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit, with_start_read};
+use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit, misfit_of_steps, with_start_read};
 use crate::gap::best_fit::normal::{Selection, dot_over};
 use crate::gap::findings::report::{BeyondPrior, ChannelGap, Gap, PointGap};
 use crate::gap::residuals::nuisance::OUTPUTS;
@@ -10,7 +9,7 @@ use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use mapper_core::Channel;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{DOUBT_SIGMAS, share_interval_95};
-use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::simulation::steady::Inputs;
 use std::collections::BTreeMap;
 use std::ops::Range;
 

@@ -1,9 +1,8 @@
 //! The fits of the effect library to a recording: the search, the closest causes refitted, and causes that begin later.
 
-use crate::gap::best_fit::adequacy::{Adequacy, adequacy};
-use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS};
+use crate::gap::best_fit::fit::{Adequacy, Effort, Fit, MAX_SIGMAS, adequacy};
 use crate::gap::best_fit::normal::Selection;
-use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::place::{Gain, places};
 use crate::gap::causes::probabilities::{Posterior, posterior};
 use crate::gap::causes::select::{

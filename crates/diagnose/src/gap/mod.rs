@@ -12,7 +12,6 @@ pub(crate) mod library_fits;
 pub(crate) mod model_error;
 pub(crate) mod next_experiment;
 pub(crate) mod preconditions;
-pub(crate) mod prepare;
 pub(crate) mod request;
 pub(crate) mod residuals;
 pub(crate) mod scores;
@@ -23,15 +22,14 @@ pub use crate::gap::preconditions::GapError;
 pub use calibrated_model::{
     CalibratedModelError, Expected, ForecastCheck, Found, FoundEffect, FoundTolerance,
 };
-pub use causes::calibration::{Calibration, Origin};
+pub use causes::additions::{Calibration, Origin};
 pub use consequence::{CorrectedMap, Correction, NotCorrected, PointCorrection};
 pub use diagnose::Diagnosed;
-pub use findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment};
+pub use findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment, GapWarning, OffsetAtRest};
 pub use findings::report::{
     BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosis, Estimate, Gap, Kind, Next, PointGap,
     SmallestSeen, Suggestion, Verdict,
 };
-pub use findings::warning::{GapWarning, OffsetAtRest};
 pub use request::{BaselineRecording, ClosureSearch, GapRequest, RigRecording};
 pub use residuals::study::Study;
 pub use scores::{EffectVisibility, Scores};

@@ -1,8 +1,7 @@
 //! What a diagnosis is given.
 
-use crate::gap::causes::calibration::Calibration;
-use crate::gap::findings::experiment::Experiment;
-use crate::gap::findings::warning::GapWarning;
+use crate::gap::causes::additions::Calibration;
+use crate::gap::findings::experiment::{Experiment, GapWarning};
 use mapper_core::{ModelTolerances, Recording, RigActuators, Soak};
 use mapper_identify::IdentifyConfig;
 use mapper_observe::declared::Declared;

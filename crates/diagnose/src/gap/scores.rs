@@ -2,7 +2,7 @@
 
 use crate::gap::best_fit::coordinate::coordinates;
 use crate::gap::best_fit::fit::{Fit, lengths};
-use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::weight;
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::preconditions::{GapError, Problem};

@@ -5,7 +5,7 @@ use crate::gap::causes::probabilities::Posterior;
 use crate::gap::causes::select::MIN_GAP_REDUCTION;
 use crate::gap::findings::report::{Gap, Verdict};
 use crate::gap::library_fits::LibraryFits;
-use crate::gap::prepare::is_of_sensors;
+use crate::gap::preconditions::is_of_sensors;
 
 /// How much of the gap the effect library explains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use mapper_core::Channel;
 use mapper_diagnose::drift::{
     Alternative, Cause, DriftReport, DriftVerdict, FoundDrift, RATE_PER_H, RateOrStep, RecordedRun,
 };
-use mapper_inference::time_history::{Shape, TimeHistory};
+use mapper_inference::hypotheses::{Shape, TimeHistory};
 
 fn limit(report: &DriftReport, cause: Cause) -> f64 {
     report.detection_limits.iter().find(|limit| limit.cause == cause).unwrap().change

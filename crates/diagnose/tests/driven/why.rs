@@ -4,8 +4,7 @@
 
 use crate::driven::common::{self, Course, ELEMENT_LAG, declared, engine, healthy};
 use mapper_core::{Channel, Recording};
-use mapper_diagnose::driven::DrivenError;
-use mapper_diagnose::driven::{Diagnosis, Side, SideRequest, SideVerdict, diagnose};
+use mapper_diagnose::driven::{Diagnosis, DrivenError, Side, SideRequest, SideVerdict, diagnose};
 use mapper_diagnose::gap::Calibration;
 use mapper_effects::catalogue;
 use mapper_physics::rig::effect::Rig;

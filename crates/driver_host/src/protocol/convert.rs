@@ -1,6 +1,6 @@
 //! Messages of the protocol from and to the types of the program, with the errors of what a driver sends.
 
-use crate::protocol::message::{ChannelDescription, Code, Description, Failure, Ranges};
+use crate::protocol::frame::{ChannelDescription, Code, Description, Failure, Ranges};
 use mapper_core::{
     BackendError, Channel, GuardName, RigDescription, SetpointRange, SetpointRanges, UnknownChannel,
 };

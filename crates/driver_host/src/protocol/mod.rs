@@ -3,7 +3,6 @@
 
 mod convert;
 mod frame;
-mod message;
 mod samples;
 #[cfg(test)]
 #[path = "../../tests/inside/schema.rs"]
@@ -11,10 +10,9 @@ mod schema;
 
 pub use crate::protocol::convert::{read_error, write_error};
 pub use convert::{InvalidData, read_description, write_description};
-pub use frame::{Encoding, FrameError, decode, encode, read_frame, write_frame};
-pub use message::{
-    ChannelDescription, Code, Configure, DescribeResult, Description, Failure, Hello, LastSample, Message,
-    Poll, Ranges, Version, Welcome,
+pub use frame::{
+    ChannelDescription, Code, Configure, DescribeResult, Description, Encoding, Failure, FrameError, Hello,
+    LastSample, Message, Poll, Ranges, Version, Welcome, decode, encode, read_frame, write_frame,
 };
 pub use samples::{Column, ElementSamples, RigEvent, Samples, TruthSamples, batch, split_batch};
 

@@ -9,21 +9,16 @@ pub(crate) mod balances;
 pub(crate) mod end_readings;
 pub(crate) mod found_fault;
 pub(crate) mod nominal_rig;
-mod places;
 pub(crate) mod possible;
-pub(crate) mod smooth;
 
 use crate::IdentifyConfig;
 use crate::faults::balance_rows::{MACHINE, Machine, Rows};
-use crate::faults::balances::conditions;
 use crate::faults::balances::efficiency::FittedEfficiencies;
-use crate::faults::balances::standstill::{self, Standstill};
-use crate::faults::balances::valve::{Opening, sides};
+use crate::faults::balances::standstill::{self, Opening, Standstill, sides};
 use crate::faults::end_readings::{CHANNELS, MAX_CORRELATED_ROWS, Readings, span_s};
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
-use crate::reading_checks::ends::Ends;
-use crate::reading_checks::failed_check::FailedCheck;
+use crate::reading_checks::ends::{Ends, FailedCheck};
 use mapper_core::{Channel, FaultKind, Method, ModelTolerances, Recording, SuspectedFault, Warning};
 use mapper_inference::hypotheses::{Likelihood, Member, Priors};
 use mapper_inference::mixture::MIN_WEIGHT;
@@ -61,16 +56,18 @@ pub(crate) fn likelihood(
     let noise = end_readings::noise(config, recording);
     let reference = config.reference;
     let mut balances: Vec<Rows> = Vec::new();
-    balances.extend(balances::valve::rows(&opened, &noise, nominal));
-    balances.extend(balances::head::rows(&readings, &noise, reference, nominal));
+    balances.extend(balances::standstill::valve_rows(&opened, &noise, nominal));
+    balances.extend(balances::efficiency::head_rows(&readings, &noise, reference, nominal));
     let used: Vec<bool> = all.iter().map(Option::is_some).collect();
     balances.extend(balances::housing::rows(recording, config, &used));
-    balances.extend(balances::inlet::rows(recording, &all, config));
+    balances.extend(balances::housing::inlet_rows(recording, &all, config));
     balances.extend(fitted.and_then(|fitted| balances::efficiency::rows(fitted, &all, reference, nominal)));
     balances.extend(standstills.iter().map(|at_rest| at_rest.rows.clone()));
     if let Some(nominal) = nominal {
-        balances.extend(fitted.and_then(|fitted| balances::convection::rows(fitted, &all, config, nominal)));
-        balances.extend(balances::conditions::rows(recording, &all, config, nominal));
+        balances.extend(
+            fitted.and_then(|fitted| balances::housing::convection_rows(fitted, &all, config, nominal)),
+        );
+        balances.extend(balances::standstill::condition_rows(recording, &all, config, nominal));
     }
     let priors = priors(config, nominal);
     let mut likelihood = Likelihood::new(priors.always.len() + priors.hypotheses.len());
@@ -180,7 +177,7 @@ fn priors(config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Priors {
         Machine::Convection => OTHER_CONVECTION_RATIO,
         // Weather, altitude, another test: more than the tolerance of a condition explains. Each of these has one.
         Machine::Condition(channel) => {
-            EXCLUDE_SIGMAS * conditions::tolerance(*channel, &tolerances).unwrap_or(1.0)
+            EXCLUDE_SIGMAS * standstill::tolerance(*channel, &tolerances).unwrap_or(1.0)
         }
         Machine::ValvePlay => OTHER_PLAY,
         Machine::FlowCapacity | Machine::Efficiency | Machine::ValveArea => OTHER_MACHINE_RATIO,

@@ -7,12 +7,10 @@
 use crate::IdentifyConfig;
 use crate::faults::balance_rows::Rows;
 use crate::faults::balances::efficiency::FittedEfficiencies;
+use crate::faults::balances::{efficiency, housing};
 use crate::faults::end_readings::Readings;
 use crate::faults::found_fault::Suspect;
-use crate::faults::{
-    balances::{convection, efficiency},
-    suspect,
-};
+use crate::faults::suspect;
 use crate::single_step::budgets::own_row;
 use crate::single_step::dynamic::Estimate;
 use mapper_core::{EstimateUncertainty, half_width_95, standard_error_of};
@@ -36,8 +34,7 @@ pub(crate) fn widen(
     (likelihood, priors): &(Likelihood, Priors),
     config: &IdentifyConfig,
 ) -> Option<()> {
-    let [etas, ln_hs] =
-        [efficiency::measured(fitted, readings), convection::measured(fitted, readings, config)];
+    let [etas, ln_hs] = [efficiency::measured(fitted, readings), housing::measured(fitted, readings, config)];
     let possible = |single: Single| {
         let Suspect::Sensor(fault) = suspect(single.index) else { return None };
         let effect = |rows: &Rows| rows.by_fault(&fault);

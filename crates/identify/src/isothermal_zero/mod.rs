@@ -3,7 +3,6 @@
 pub(crate) mod groups;
 pub(crate) mod periodic;
 pub(crate) mod references;
-pub(crate) mod relaxation;
 pub(crate) mod soak_readings;
 pub(crate) mod zero;
 pub(crate) mod zero_outcome;

@@ -11,7 +11,6 @@ use crate::isothermal_zero::groups::{
 };
 use crate::isothermal_zero::periodic::{self, PeriodicError};
 use crate::isothermal_zero::references::{CellReference, cell_reading, compare};
-use crate::isothermal_zero::relaxation;
 use crate::isothermal_zero::soak_readings::{
     Reading, SOAK_PARTS, at_rest, combined_sigma, common, rests, soak_mean, usable,
 };
@@ -416,7 +415,7 @@ impl SoakReadings<'_> {
             fewest = fewest.min(usable.len());
         }
         let variance = self.config.noise().variance_of_mean(fewest, TREND_BLOCK_S);
-        relaxation::limit(&t_s, &means, noise_sigma * variance.sqrt())
+        periodic::limit(&t_s, &means, noise_sigma * variance.sqrt())
     }
 }
 
@@ -518,6 +517,6 @@ fn expected_limit_error(
         .collect();
     let samples = (TREND_BLOCK_S / SAMPLE_INTERVAL_S) as usize;
     let variance = config.noise().variance_of_mean(samples, TREND_BLOCK_S);
-    let relaxing: Vec<f64> = t_s.iter().map(|t_s| relaxation::usual_k(*t_s)).collect();
-    relaxation::limit(&t_s, &relaxing, noise_sigma * variance.sqrt()).map(|(_, error)| error)
+    let relaxing: Vec<f64> = t_s.iter().map(|t_s| periodic::usual_k(*t_s)).collect();
+    periodic::limit(&t_s, &relaxing, noise_sigma * variance.sqrt()).map(|(_, error)| error)
 }

@@ -4,14 +4,14 @@
 //! and everything that the steps share: the Fisher information of all steps together.
 
 use crate::IdentifyConfig;
-use crate::joint::Fitted;
 use crate::joint::fit::solve::Problem;
-use crate::joint::fit::start;
+use crate::joint::fit::{refinements, start};
 use crate::joint::step_model::parameters::Refinement;
-use crate::joint::step_model::rows::{Row, StepRows, TIME_ROUNDING_S, block_s_after, place, slopes};
-use crate::joint::step_model::smoothing::Smoothing;
-use crate::joint::uncertainty::numbers::Numbers;
-use crate::joint::{MAX_PRIOR_SENSITIVITY_ETA, fit::refinements};
+use crate::joint::step_model::rows::{
+    Row, Smoothing, StepRows, TIME_ROUNDING_S, block_s_after, place, slopes,
+};
+use crate::joint::uncertainty::Numbers;
+use crate::joint::{Fitted, MAX_PRIOR_SENSITIVITY_ETA};
 use crate::single_step::dynamic::Estimate;
 use mapper_core::{MethodResult, MethodResults, SAMPLE_INTERVAL_S};
 use mapper_numerics::coloured_noise::covariance_of_means;

@@ -9,7 +9,6 @@
 pub(crate) mod expected;
 pub(crate) mod fit;
 pub(crate) mod judge;
-pub(crate) mod regions;
 pub(crate) mod step_model;
 pub(crate) mod thermal_model;
 pub(crate) mod uncertainty;
@@ -19,17 +18,17 @@ use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::step_model::parameters::{INLET, LN_INNER_CONDUCTANCE, LOGIT_INNER, bounds};
 use crate::joint::step_model::rows::{Row, StepRows};
-use crate::joint::uncertainty::numbers::Numbers;
-use crate::joint::uncertainty::quantity::Number;
+use crate::joint::uncertainty::{Number, Numbers};
 use crate::single_step::dynamic::{Estimate, FittedReadings};
 use crate::step_data::end_state::EndState;
+use crate::step_data::samples;
 use crate::step_outcome::findings::Findings;
-use crate::{Choice, IdentifyConfig, step_data::commands};
+use crate::{Choice, IdentifyConfig};
 use mapper_core::{
     Channel, EstimateUncertainty, FitFailure, LeftOut, Recording, ThermalModel, Verdict, Warning, Window,
     confidence_interval_95,
 };
-use mapper_numerics::least_squares::descent::ROUNDS;
+use mapper_numerics::least_squares::ROUNDS;
 use mapper_numerics::statistics::rms;
 use serde::Serialize;
 
@@ -122,7 +121,7 @@ pub(crate) fn estimate(
         }
         return Joint { estimates, thermal: None, dynamic, fitted: None };
     };
-    let fitted = uncertainty::as_measured::as_measured(&attempt.problem, &steps, config);
+    let fitted = uncertainty::as_measured(&attempt.problem, &steps, config);
     let Attempt { problem, numbers, thermal, prior_sensitivity, left_out, .. } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
     let predictions = problem.predictions(&problem.shared, &problem.locals(), None);
@@ -160,9 +159,9 @@ pub(crate) fn estimate(
         let residual =
             fitted.first().map(|t2| t2.read_k.iter().zip(&t2.fitted_k).map(|(read, found)| read - found));
         let [eta_rows, ln_h_rows] = numbers.budgets[i].clone();
-        let eta_rows = eta_rows.into_iter().map(|row| uncertainty::budget::in_unit(row, 1.0, "1")).collect();
+        let eta_rows = eta_rows.into_iter().map(|row| uncertainty::in_unit(row, 1.0, "1")).collect();
         let h_rows =
-            ln_h_rows.into_iter().map(|row| uncertainty::budget::in_unit(row, h_w_m2k, "W/(m2 K)")).collect();
+            ln_h_rows.into_iter().map(|row| uncertainty::in_unit(row, h_w_m2k, "W/(m2 K)")).collect();
         estimates[step.position] = Estimate {
             budgets: [eta_rows, h_rows],
             eta: Some((eta, Some(eta_error))),
@@ -186,7 +185,7 @@ pub(crate) fn estimate(
         if let Some(region) = left_out.as_ref().filter(|_| member.excluded) {
             own.doubt(Warning::LeftOut(region.clone()));
         }
-        if !commands::begins_with_jump(&recording.steps, step.position) {
+        if !samples::begins_with_jump(&recording.steps, step.position) {
             own.remark(Warning::FromConvectionLaw { convection_origin: None });
         }
         own.remark_undeclared(config);
@@ -290,11 +289,11 @@ impl<'a> Attempt<'a> {
 
     /// The fit without the region of the map that disagrees most, if any.
     fn without_a_region(&self, steps: &'a [StepRows], config: &IdentifyConfig) -> Option<Self> {
-        regions::regions(steps).into_iter().find_map(|of_size| {
+        judge::regions(steps).into_iter().find_map(|of_size| {
             let rests = of_size.into_iter().filter_map(|region| {
                 let rest = self.without(&region.steps, steps, config)?;
                 let undoubted = rest.thermal.doubts.is_empty() && judge::fits(&rest.problem);
-                let sigmas = regions::disagreement(
+                let sigmas = judge::disagreement(
                     (&self.problem, &self.covariance),
                     (&rest.problem, &rest.covariance),
                 )?;
@@ -368,7 +367,7 @@ fn approach(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
 impl Fitted {
     /// Evaluates the parameters with a prior of a problem at its minimum, and moves it to the mean of their mixture.
     fn of(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<Self> {
-        let inlet_sigma = fit::inlet::settle(problem)?;
+        let inlet_sigma = fit::refinements::settle_inlet(problem)?;
         let open = problem.clone();
         let refinements = fit::refinements::settle(problem, config)?;
         let (covariance, gain) = covariance(problem, refinements.as_ref(), inlet_sigma)?;
@@ -400,7 +399,7 @@ fn covariance(
         None => None,
     };
     if let Some(sigma) = inlet_sigma {
-        covariance = fit::inlet::carry(problem, sigma, &covariance)?;
+        covariance = fit::refinements::carry(problem, sigma, &covariance)?;
         let row = covariance.row_of(INLET)?;
         gain = gain.map(|gain| gain.with_row(row));
     }

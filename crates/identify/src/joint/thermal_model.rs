@@ -10,7 +10,7 @@ use crate::joint::step_model::parameters::{
     PROBE_MM2, STEP_HEAT, SURFACE, TC_LAG, symbol,
 };
 use crate::joint::step_model::rows::StepRows;
-use crate::joint::uncertainty::numbers::Numbers;
+use crate::joint::uncertainty::Numbers;
 use mapper_core::unit_factors::M_PER_MM;
 use mapper_core::{
     ConvectionLaw, CorrelatedPair, EstimateUncertainty, IdentifiedHousing, Origin, SharedValue, ThermalModel,

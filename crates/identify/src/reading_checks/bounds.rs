@@ -1,14 +1,15 @@
-//! Checks T2 against the physical limits of any compressor.
+//! Checks the readings of compressor and turbine against physics: limits of any compressor, specific speed, and the power of the shaft.
 //!
 //! T2 lies between isentropic compression and about three times that rise: turbocharger compressors have 0.3 to 0.85. A housing far from the
 //! gas temperature changes this apparent efficiency, but for a rise of 20 K or more it stays within 0.2 to 1.3 (docs/reference/model.md: the housing
 //! exchanges at most half of the capacity flow times its distance). Hot turbine inlet gas read as T2 is beyond that; a turbine may be driven
 //! by cold gas.
 
-use crate::reading_checks::ends::Ends;
-use crate::reading_checks::failed_check::FailedCheck;
-use mapper_core::{Scaled, Swapped, Warning};
+use crate::reading_checks::ends::{Ends, FailedCheck};
+use mapper_core::{Channel, Scaled, Swapped, Warning, check_running};
 use mapper_numerics::statistics::median;
+use mapper_physics::gas::air::Air;
+use mapper_physics::machine::state::rad_s_of_rpm;
 
 /// Isentropic rise above which heat no longer hides the work, K. Bound: heat changes T2 by less than half of it.
 const MIN_RISE_K: f64 = 20.0;
@@ -21,7 +22,7 @@ const APPARENT: std::ops::RangeInclusive<f64> = 0.2..=1.3;
 /// after it.
 const MIDDLE: std::ops::RangeInclusive<f64> = 0.35..=1.0;
 
-pub(crate) fn failed_checks(ends: &[Option<Ends>]) -> Vec<FailedCheck> {
+pub(crate) fn efficiency_checks(ends: &[Option<Ends>]) -> Vec<FailedCheck> {
     let known: Vec<&Ends> = ends.iter().flatten().collect();
     let all = || (0..ends.len()).collect::<Vec<usize>>();
     let mut found = Vec::new();
@@ -67,6 +68,76 @@ pub(crate) fn failed_checks(ends: &[Option<Ends>]) -> Vec<FailedCheck> {
     found
 }
 
+// Compares speed, flow and head: the specific speed `omega sqrt(Q)/dh^0.75` is independent of the diameter. Radial compressors have 0.3 to 2
+// from surge to near choke, whatever their size (Cordier's diagram, e.g. Balje, Turbomachines, 1981).
+// A wrong unit changes it far more than machines differ: 1/s for rpm by 60, kg/h for kg/s by 60.
+
+/// Exponent of the head. Source: definition of the specific speed.
+const HEAD_EXPONENT: f64 = 0.75;
+
+/// Limits for the median of a campaign's points, with a wide margin about real machines. Bound: radial compressors have 0.3 to 2
+/// (Cordier's diagram).
+const SPECIFIC_SPEED: std::ops::RangeInclusive<f64> = 0.15..=4.0;
+
+pub(crate) fn specific_speed_check(ends: &[Option<Ends>]) -> Option<FailedCheck> {
+    let used: Vec<&Ends> = ends.iter().flatten().filter(|end| end.isentropic_rise_k() > 0.0).collect();
+    let of = |end: &&Ends| {
+        let omega_rad_s = rad_s_of_rpm(end.speed_rpm);
+        let flow_m3_s = end.flow_kg_s * end.air.gas_constant_j_kgk() * end.t1_k / end.p1_pa;
+        let head_j_kg = end.air.heat_capacity_j_kgk(end.t1_k) * end.isentropic_rise_k();
+        omega_rad_s * flow_m3_s.max(0.0).sqrt() / head_j_kg.powf(HEAD_EXPONENT)
+    };
+    let middle = median(used.iter().map(of).filter(|speed| speed.is_finite()))?;
+    if SPECIFIC_SPEED.contains(&middle) {
+        return None;
+    }
+    let of_middle = |read: fn(&Ends) -> f64| median(used.iter().map(|end| read(end))).unwrap_or(f64::NAN);
+    let scaled = Scaled::SpecificSpeed {
+        speed_rpm: of_middle(|end| end.speed_rpm),
+        flow_kg_s: of_middle(|end| end.flow_kg_s),
+        pressure_ratio: of_middle(|end| end.p2_pa / end.p1_pa),
+        specific_speed: middle,
+    };
+    Some(FailedCheck::new(Warning::ScaledChannel(scaled), (0..ends.len()).collect()))
+}
+
+// Compares compressor and turbine power: a shaft cannot deliver more than it receives.
+// `m_c (h2 - h1)` against `m_t (h3 - h4)`, the whole enthalpy that the exhaust gas loses, heat included. Bearings and housings take 10
+// to 40 % of it. A single point may exceed it for a while, if a hot compressor housing heats the air or the shaft slows down. The median of a
+// campaign may not.
+
+/// Limits for the ratio of compressor to turbine power. Bound: upper, and lower. A turbine housing that loses as much as it delivers is
+/// far below every gas stand.
+const POWER_RATIO: std::ops::RangeInclusive<f64> = 0.2..=1.15;
+
+pub(crate) fn power_check(ends: &[Option<Ends>]) -> Option<FailedCheck> {
+    let powers_w: Vec<(f64, f64)> = ends
+        .iter()
+        .flatten()
+        .filter_map(|end| {
+            let (flow_kg_s, t3_k, t4_k) = (end.turbine_flow_kg_s?, end.t3_k?, end.t4_k?);
+            let running = [(Channel::TurbineFlow, flow_kg_s), (Channel::T3, t3_k), (Channel::T4, t4_k)];
+            if running.into_iter().any(|(channel, value)| check_running(channel, value).is_err()) {
+                return None;
+            }
+            let taken = end.flow_kg_s * end.air.enthalpy_rise_j_kg(end.t1_k, end.t2_k);
+            let given = flow_kg_s * Air::new(end.turbine_gas, 0.0).enthalpy_rise_j_kg(t4_k, t3_k);
+            (given > 0.0).then_some((taken, given))
+        })
+        .collect();
+    let of_points = median(powers_w.iter().map(|(taken, given)| taken / given))?;
+    let of = |read: fn(&(f64, f64)) -> f64| median(powers_w.iter().map(read)).unwrap_or(f64::NAN);
+    let (compressor_w, turbine_w) = (of(|powers| powers.0), of(|powers| powers.1));
+    // The ratio of few points, as early in a run, may be that of a cooling housing at low power; a wrong scale shows in both.
+    let power_ratio = compressor_w / turbine_w;
+    let is_possible = [of_points, power_ratio].iter().any(|ratio| POWER_RATIO.contains(ratio));
+    if is_possible || 2 * powers_w.len() < ends.len() {
+        return None;
+    }
+    let scaled = Scaled::ShaftPower { compressor_w, turbine_w, power_ratio };
+    Some(FailedCheck::new(Warning::ScaledChannel(scaled), (0..ends.len()).collect()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -98,9 +169,9 @@ mod tests {
     #[test]
     fn gas_colder_than_the_outlet_is_no_mistake_and_hot_gas_read_as_t2_is_one() {
         for t3_k in [300.0, 385.0, 773.15] {
-            assert!(failed_checks(&ends_with(t3_k, None)).is_empty(), "{t3_k} K before the turbine");
+            assert!(efficiency_checks(&ends_with(t3_k, None)).is_empty(), "{t3_k} K before the turbine");
         }
-        let exchanged = failed_checks(&ends_with(388.0, Some(773.15)));
+        let exchanged = efficiency_checks(&ends_with(388.0, Some(773.15)));
         assert!(matches!(exchanged[0].warning, Warning::SwappedChannels(_)), "{exchanged:?}");
     }
 }

@@ -1,13 +1,12 @@
-//! Detects late channels: at a jump of the operating point all compressor readings change at once.
+//! Checks times: late channels, and impossible steps.
 //!
 //! Speed, flow, P2 and T2 show the jump as a change of level. The housing shows a change of slope, since its temperature cannot jump. Over all
 //! jumps of a recording the moment of the largest change is known to a second or two. Two loggers with separate clocks, a filter, or a slow
 //! fieldbus client make a channel late.
 
-use crate::reading_checks::failed_check::FailedCheck;
-use crate::step_data::commands::begins_with_jump;
-use crate::step_data::samples::slope_per_s;
-use mapper_core::{Channel, Recording, Series, Swapped, Warning, WindowRule};
+use crate::reading_checks::ends::FailedCheck;
+use crate::step_data::samples::{begins_with_jump, slope_per_s};
+use mapper_core::{Channel, Recording, Series, StepConflict, Swapped, Warning, WindowRule, step_number};
 use mapper_numerics::statistics::{MIN_VALUES, mean, median};
 
 /// Spacing of the moments in averaging times. Bound: fine compared with a level, so that no peak is missed.
@@ -33,7 +32,7 @@ const WATCHED: [(Channel, bool); 5] = [
     (Channel::Tc, true),
 ];
 
-pub(crate) fn failed_checks(recording: &Recording) -> Vec<FailedCheck> {
+pub(crate) fn lag_checks(recording: &Recording) -> Vec<FailedCheck> {
     let steps = &recording.steps;
     let jumps_s: Vec<f64> = (0..steps.len())
         .filter(|position| begins_with_jump(steps, *position))
@@ -114,4 +113,42 @@ fn change(series: &Series, moment_s: f64, slope: bool) -> Option<f64> {
     };
     let change = rate(moment_s, moment_s + 2.0 * LEVEL_S)? - rate(moment_s - 2.0 * LEVEL_S, moment_s)?;
     Some(change).filter(|change| change.is_finite())
+}
+
+/// Overlap that the rounded times of other loggers explain, s. Bound: half of their second.
+const ROUNDED_S: f64 = 0.5;
+
+/// Steps that overlap in time or share a number.
+pub(crate) fn step_checks(recording: &Recording) -> Vec<FailedCheck> {
+    let steps = &recording.steps;
+    let mut found = Vec::new();
+    let mut by_time: Vec<usize> = (0..steps.len()).filter(|i| steps[*i].start_s < steps[*i].end_s).collect();
+    by_time.sort_by(|a, b| steps[*a].start_s.total_cmp(&steps[*b].start_s));
+    // The step with the latest end so far: a step that begins before that end overlaps it.
+    let mut furthest: Option<usize> = None;
+    for &position in &by_time {
+        let step = &steps[position];
+        if let Some(before) = furthest.filter(|before| steps[*before].end_s > step.start_s + ROUNDED_S) {
+            let overlap = StepConflict::Overlap {
+                first: step_number(steps[before].index),
+                first_start_s: steps[before].start_s,
+                first_end_s: steps[before].end_s,
+                second: step_number(step.index),
+                second_start_s: step.start_s,
+                second_end_s: step.end_s,
+            };
+            found.push(FailedCheck::new(Warning::StepsContradict(overlap), vec![before, position]));
+        }
+        if furthest.is_none_or(|before| steps[before].end_s < step.end_s) {
+            furthest = Some(position);
+        }
+    }
+    let mut by_index: Vec<usize> = (0..steps.len()).collect();
+    by_index.sort_by_key(|position| steps[*position].index);
+    for same in by_index.chunk_by(|a, b| steps[*a].index == steps[*b].index).filter(|same| same.len() > 1) {
+        let shared =
+            StepConflict::SharedNumber { number: step_number(steps[same[0]].index), steps: same.len() };
+        found.push(FailedCheck::new(Warning::StepsContradict(shared), same.to_vec()));
+    }
+    found
 }

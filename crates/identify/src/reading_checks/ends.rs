@@ -1,7 +1,7 @@
-//! The readings at the end of each step, when everything but the housing has settled.
+//! The readings at the end of each step, when everything but the housing has settled; and the failed check of them.
 
 use crate::IdentifyConfig;
-use mapper_core::{Channel, Recording, is_reading};
+use mapper_core::{Channel, Recording, Warning, is_reading};
 use mapper_numerics::statistics::median;
 use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
@@ -73,4 +73,26 @@ pub(crate) fn ends(recording: &Recording, config: &IdentifyConfig) -> Vec<Option
             (end.p1_pa > 0.0 && end.p2_pa > 0.0 && end.isentropic_rise_k().is_finite()).then_some(end)
         })
         .collect()
+}
+
+/// A failed check of the readings, and the steps that depend on them.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FailedCheck {
+    /// Channel and values.
+    pub(crate) warning: Warning,
+    /// Positions of the steps.
+    pub(crate) steps: Vec<usize>,
+    /// Whether identification omits the samples concerned, so that the rest of the step can be used.
+    pub(crate) samples_left_out: bool,
+}
+
+impl FailedCheck {
+    pub(crate) fn new(warning: Warning, steps: Vec<usize>) -> Self {
+        FailedCheck { warning, steps, samples_left_out: false }
+    }
+
+    /// A failed check that concerns all steps of a recording.
+    pub(crate) fn of_all_steps(warning: Warning, recording: &Recording) -> Self {
+        FailedCheck::new(warning, (0..recording.steps.len()).collect())
+    }
 }

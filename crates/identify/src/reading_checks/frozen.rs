@@ -1,15 +1,14 @@
-//! Detects frozen and saturated channels: a reading with noise does not repeat to the last digit.
+//! Checks each channel by itself: frozen and saturated, dead, and noisier than declared.
 //!
 //! A stuck sensor, a logger with a failed module and a saturated amplifier all repeat one value. A coarse logger also repeats values, but all
 //! the time. Such a channel counts as frozen only if it stays constant over a jump that should move it.
 
 use crate::IdentifyConfig;
 use crate::needs::needs;
-use crate::reading_checks::ends::Ends;
-use crate::reading_checks::failed_check::FailedCheck;
-use crate::step_data::commands::FOLLOWED_S;
-use mapper_core::{Channel, Recording, Series, Warning, is_jump, repeats};
-use mapper_numerics::statistics::{MIN_VALUES, range};
+use crate::reading_checks::ends::{Ends, FailedCheck};
+use crate::step_data::samples::{FOLLOWED_S, LONGEST_BRIDGE_S};
+use mapper_core::{Channel, Recording, Series, Warning, check_running, is_jump, repeats};
+use mapper_numerics::statistics::{MIN_VALUES, median, range, robust_sigma};
 use mapper_physics::rig::sensor_fault::repeats_s;
 
 /// Share of equal neighbours outside the long runs above which a logger counts as coarse. Bound: noise above a digit repeats less often.
@@ -21,7 +20,7 @@ struct Run {
     last: usize,
 }
 
-pub(crate) fn failed_checks(
+pub(crate) fn frozen_checks(
     recording: &Recording,
     ends: &[Option<Ends>],
     config: &IdentifyConfig,
@@ -92,4 +91,59 @@ fn runs(series: &Series, shortest_s: f64) -> Vec<Run> {
         run.last + 1 - run.first >= MIN_VALUES && series.t_s[run.last] - series.t_s[run.first] >= shortest_s
     };
     repeats(&series.values).map(|(first, last)| Run { first, last }).filter(long).collect()
+}
+
+// Detects noise far above its declaration: a broken shield, a loose contact, a pulsating flow.
+// Successive samples of a slow quantity differ only by noise. The declared noise sets the weight of each reading and the width of intervals.
+// A channel with several times that noise makes the intervals too narrow.
+
+/// Ratio of a sample's standard deviation to the declared one above which intervals are far too narrow. Judgement; noise with a time
+/// constant only reduces the difference between samples. Bound: noise with a time constant only reduces the difference between samples.
+const MAX_RATIO: f64 = 3.0;
+
+pub(crate) fn noise_checks(recording: &Recording, config: &IdentifyConfig) -> Vec<FailedCheck> {
+    needs(config.method)
+        .into_iter()
+        .filter_map(|channel| {
+            let declared = config.declared.get(&channel)?.noise_sigma;
+            let series = recording.series.get(&channel)?;
+            let close = |pair: &[f64]| pair[1] - pair[0] <= LONGEST_BRIDGE_S;
+            let differences: Vec<f64> = series
+                .t_s
+                .windows(2)
+                .zip(series.values.windows(2))
+                .filter(|(times, values)| close(times) && values.iter().all(|value| value.is_finite()))
+                .map(|(_, values)| (values[1] - values[0]) / std::f64::consts::SQRT_2)
+                .collect();
+            let found = robust_sigma(&differences)?;
+            if !(declared > 0.0 && found > MAX_RATIO * declared) {
+                return None;
+            }
+            let noisy = Warning::NoisyChannel { channel, noise: found, declared_noise: declared };
+            Some(FailedCheck::of_all_steps(noisy, recording))
+        })
+        .collect()
+}
+
+// Detects dead channels and wrong units: the median reading of a step is impossible for a running machine.
+// The ranges are those of `mapper_core::plausible`, wide enough for every turbocharger on a gas stand.
+
+pub(crate) fn plausibility_checks(recording: &Recording, config: &IdentifyConfig) -> Vec<FailedCheck> {
+    needs(config.method)
+        .into_iter()
+        .filter_map(|channel| {
+            let series = recording.series.get(&channel)?;
+            let (mut steps, mut middles) = (Vec::new(), Vec::new());
+            for (position, step) in recording.steps.iter().enumerate() {
+                let values = series.slice(step.start_s, step.end_s).1;
+                let Some(middle) = median(values.iter().filter(|value| value.is_finite())) else { continue };
+                if check_running(channel, middle).is_err() {
+                    steps.push(position);
+                    middles.push(middle);
+                }
+            }
+            let why = check_running(channel, median(&middles)?).err()?;
+            Some(FailedCheck::new(Warning::DeadChannel { channel, reading: why.value }, steps))
+        })
+        .collect()
 }

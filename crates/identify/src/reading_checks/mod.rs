@@ -7,17 +7,10 @@
 pub(crate) mod bounds;
 mod clock;
 pub(crate) mod ends;
-pub(crate) mod failed_check;
 mod frozen;
-mod noise;
-mod plausible;
-mod shaft_power;
-mod specific_speed;
-mod steps;
 
 use crate::IdentifyConfig;
-use crate::reading_checks::ends::{Ends, ends};
-use crate::reading_checks::failed_check::FailedCheck;
+use crate::reading_checks::ends::{Ends, FailedCheck, ends};
 use mapper_core::Recording;
 
 /// All failed checks, and the ends of the unaffected steps.
@@ -26,16 +19,16 @@ pub(crate) fn failed_checks(
     config: &IdentifyConfig,
 ) -> (Vec<FailedCheck>, Vec<Option<Ends>>) {
     let mut ends = ends(recording, config);
-    let mut found = steps::failed_checks(recording);
-    found.extend(plausible::failed_checks(recording, config));
-    found.extend(frozen::failed_checks(recording, &ends, config));
-    found.extend(noise::failed_checks(recording, config));
-    found.extend(clock::failed_checks(recording));
+    let mut found = clock::step_checks(recording);
+    found.extend(frozen::plausibility_checks(recording, config));
+    found.extend(frozen::frozen_checks(recording, &ends, config));
+    found.extend(frozen::noise_checks(recording, config));
+    found.extend(clock::lag_checks(recording));
     // A channel already named is not reported again because of a contradiction that it causes.
     leave_out(&mut ends, &found);
-    found.extend(specific_speed::failed_checks(&ends));
-    found.extend(bounds::failed_checks(&ends));
-    found.extend(shaft_power::failed_checks(&ends));
+    found.extend(bounds::specific_speed_check(&ends));
+    found.extend(bounds::efficiency_checks(&ends));
+    found.extend(bounds::power_check(&ends));
     leave_out(&mut ends, &found);
     (found, ends)
 }

@@ -1,8 +1,7 @@
 //! Predicts the result of a single-step method for a forecast step, for planning before the measurement. For `joint` see `joint/expected.rs`.
 
 use crate::IdentifyConfig;
-use crate::single_step::bias::declared_effect;
-use crate::single_step::covariance::{Correlation, NoiseVariances};
+use crate::single_step::covariance::{Correlation, NoiseVariances, declared_effect};
 use crate::single_step::fit::{Geometry, fit};
 use crate::single_step::steady::{apparent_eta, uncertainty};
 use crate::step_data::samples::{Samples, forecast_row};

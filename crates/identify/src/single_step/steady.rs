@@ -3,12 +3,12 @@
 //! Heat between gas and housing counts as work here. The dynamic method avoids the resulting error of the adiabatic efficiency (fig. 5 of the
 //! paper).
 
-use crate::single_step::bias::READING_STEP_RATIO;
+use crate::IdentifyConfig;
+use crate::single_step::covariance::READING_STEP_RATIO;
 use crate::single_step::dynamic::{Estimate, enough};
-use crate::step_data::cleaning::without_spikes;
-use crate::step_data::samples::{Row, Samples, slope_per_s};
+use crate::step_data::samples::{Row, Samples, slope_per_s, without_spikes};
 use crate::step_outcome::findings::Findings;
-use crate::{IdentifyConfig, step_outcome::interval_width};
+use crate::step_outcome::interval_width;
 use mapper_core::unit_factors::S_PER_MIN;
 use mapper_core::{Channel, EstimateUncertainty, EtaSignal, NoCompression, Recording, Warning, Window};
 use mapper_numerics::statistics::standard_deviation;

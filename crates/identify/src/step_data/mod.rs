@@ -1,8 +1,5 @@
 //! Readings of one step and their preparation for identification: cleaning, commands, window, and end state.
 
-pub(crate) mod cleaning;
-pub(crate) mod commands;
 pub(crate) mod end_state;
 pub(crate) mod humidity;
 pub(crate) mod samples;
-pub(crate) mod window;

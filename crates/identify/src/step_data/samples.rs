@@ -1,11 +1,17 @@
-//! The samples of a window on one time base, total pressures, complete rows only.
+//! Samples of one step: cleaned of bad readings, with the commands that jump.
 
 use crate::IdentifyConfig;
-use mapper_core::{Channel, Recording, Series, Window, is_reading};
-use mapper_numerics::statistics::mean;
+use crate::step_outcome::findings::Findings;
+use mapper_core::{
+    Channel, Recording, SAME_COMMAND_RATIO, Series, StepMarker, Warning, Window, is_reading, is_same_command,
+    repeats,
+};
+use mapper_numerics::statistics::{MIN_VALUES, mean, median_of_sorted, robust_sigma};
+use mapper_observe::redundant_sensors::fuse::SPIKE_SIGMAS;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 use mapper_physics::operating_point::forecast::ForecastRow;
+use mapper_physics::rig::sensor_fault::repeats_s;
 
 /// Longest gap between neighbouring samples of a channel, s. Bound: slow loggers have 1 Hz.
 pub const LONGEST_BRIDGE_S: f64 = 2.5;
@@ -179,6 +185,143 @@ fn bridged(series: &Series, t_s: f64) -> f64 {
     let Some(before) = after.checked_sub(1) else { return f64::NAN };
     let (t0_s, v0) = (series.t_s[before], series.values[before]);
     if t1_s - t0_s > LONGEST_BRIDGE_S { f64::NAN } else { v0 + (v1 - v0) * (t_s - t0_s) / (t1_s - t0_s) }
+}
+
+/// Smallest spike of P1 that is removed, Pa. Bound: one smaller spike among the hundred samples of a window moves the efficiency by
+/// 0.01 points.
+const MIN_SPIKE_P1_PA: f64 = 500.0;
+/// The same of P2, Pa. Bound: as for P1, at twice the pressure.
+const MIN_SPIKE_P2_PA: f64 = 1000.0;
+/// The same of the flow, kg/s. Bound: a few per cent of the smallest flows.
+const MIN_SPIKE_KG_S: f64 = 2e-3;
+/// The same of the temperatures, K. Bound: several times the noise of a thermocouple.
+const MIN_SPIKE_K: f64 = 1.0;
+
+fn smallest_spike(channel: Channel) -> f64 {
+    match channel {
+        Channel::P1 => MIN_SPIKE_P1_PA,
+        Channel::P2 => MIN_SPIKE_P2_PA,
+        Channel::CompressorFlow => MIN_SPIKE_KG_S,
+        _ => MIN_SPIKE_K,
+    }
+}
+
+/// The samples without spikes; reports removals in `findings`.
+pub(crate) fn without_spikes(samples: Samples, findings: &mut Findings) -> Samples {
+    // A channel without declared noise is never treated as stuck.
+    cleaned(samples, &IdentifyConfig::default(), findings)
+}
+
+/// The samples without spikes and without those of a stuck channel; reports removals in `findings`.
+pub(crate) fn cleaned(mut samples: Samples, config: &IdentifyConfig, findings: &mut Findings) -> Samples {
+    let t_s = samples.times_s();
+    let mut kept = vec![true; samples.len()];
+    let mut spikes = 0;
+    for channel in Row::CHANNELS {
+        let smallest = smallest_spike(channel);
+        let column: Vec<f64> = samples.rows.iter().map(|row| row.read(channel)).collect();
+        for index in spikes_of(&column, smallest) {
+            spikes += usize::from(kept[index]);
+            kept[index] = false;
+        }
+        let noisy = config.sensor(channel).noise_sigma > 0.0;
+        if !noisy {
+            continue;
+        }
+        let stuck = stuck_of(&t_s, &column, repeats_s(channel));
+        if let (Some(first), Some(last)) = (stuck.first(), stuck.last()) {
+            findings.doubt(Warning::Stuck { channel, duration_s: t_s[*last] - t_s[*first] });
+        }
+        stuck.into_iter().for_each(|index| kept[index] = false);
+    }
+    if spikes > 0 {
+        findings.remark(Warning::Outliers { count: spikes });
+    }
+    let mut kept = kept.into_iter();
+    samples.rows.retain(|_| kept.next().unwrap_or(false));
+    samples
+}
+
+fn spikes_of(column: &[f64], smallest: f64) -> Vec<usize> {
+    // The sorted neighbours on either side; from one sample to the next, one enters and one leaves.
+    let mut sorted: Vec<f64> = Vec::with_capacity(2 * MIN_VALUES + 2);
+    let place = |sorted: &[f64], value: f64| sorted.partition_point(|other| other.total_cmp(&value).is_lt());
+    for value in column.iter().take(MIN_VALUES) {
+        sorted.insert(place(&sorted, *value), *value);
+    }
+    let mut off = Vec::with_capacity(column.len());
+    for (i, value) in column.iter().enumerate() {
+        if let Some(coming) = column.get(i + MIN_VALUES) {
+            sorted.insert(place(&sorted, *coming), *coming);
+        }
+        if let Some(going) = i.checked_sub(MIN_VALUES + 1).and_then(|before| column.get(before)) {
+            sorted.remove(place(&sorted, *going));
+        }
+        off.push(value - median_of_sorted(&sorted).unwrap_or(*value));
+    }
+    let Some(sigma) = robust_sigma(&off) else { return Vec::new() };
+    let limit = (SPIKE_SIGMAS * sigma).max(smallest);
+    (0..off.len()).filter(|i| off[*i].abs() > limit).collect()
+}
+
+fn stuck_of(t_s: &[f64], column: &[f64], repeats_s: f64) -> Vec<usize> {
+    let long = repeats(column).filter(|(first, last)| t_s[*last] - t_s[*first] >= repeats_s);
+    long.flat_map(|(first, last)| first..=last).collect()
+}
+
+// The commands of a step: whether they begin with a jump, and when they settle.
+// A closed loop that holds the speed changes P3 slightly all the time. Such a change is no jump, and the command counts as settled.
+
+/// Time after a jump from which only the housings still change, s. Bound: several settling times of probe and speed.
+pub(crate) const FOLLOWED_S: f64 = 20.0;
+
+/// Gap to the previous step above which the previous command is not the starting point, s. Bound: the housings keep their state over a
+/// shorter one.
+const MAX_GAP_S: f64 = 60.0;
+
+/// Whether a command changes; an unknown one does not.
+fn changed(before: f64, after: f64) -> bool {
+    before.is_finite() && after.is_finite() && !is_same_command(before, after)
+}
+
+/// Whether the step at `position` of `steps` begins with a change of a command.
+///
+/// The first step does so only if its marker has the previous command.
+pub(crate) fn begins_with_jump(steps: &[StepMarker], position: usize) -> bool {
+    let Some(step) = steps.get(position) else { return false };
+    if let (Some(from), Some(to)) = (step.from, step.to) {
+        return from != to;
+    }
+    let before = position.checked_sub(1).and_then(|before| steps.get(before));
+    before.is_some_and(|before| {
+        step.start_s - before.end_s <= MAX_GAP_S
+            && (changed(before.p3_pa, step.p3_pa)
+                || changed(before.valve_opening_ratio, step.valve_opening_ratio))
+    })
+}
+
+/// Time of the last change of P3 and valve commands within the step (its start if none is recorded), s. Changes of P3 count until it stays
+/// within [`SAME_COMMAND_RATIO`] of its last value, as a loop trims it while the housings warm up.
+pub(crate) fn settled_s(recording: &Recording, step: &StepMarker) -> f64 {
+    let mut settled_s = step.start_s;
+    for channel in [Channel::P3Command, Channel::ValveCommand] {
+        let Some(series) = recording.series.get(&channel) else { continue };
+        let range = series.range(step.start_s, step.end_s);
+        // The change at the step's end belongs to the next one.
+        let inside = range.filter(|i| series.t_s[*i] < step.end_s);
+        let last = inside.clone().next_back().map(|i| series.values[i]);
+        let trimmed = |value: f64| {
+            channel == Channel::P3Command
+                && last.is_some_and(|last| (value - last).abs() <= SAME_COMMAND_RATIO * last.abs())
+        };
+        for i in inside {
+            let before = i.checked_sub(1).map(|before| series.values[before]);
+            if before.is_some_and(|before| changed(before, series.values[i]) && !trimmed(before)) {
+                settled_s = settled_s.max(series.t_s[i]);
+            }
+        }
+    }
+    settled_s
 }
 
 #[cfg(test)]

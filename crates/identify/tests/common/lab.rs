@@ -6,8 +6,9 @@ use mapper_core::{
     Channel, InletConvection, OperatingPoint, Recording, ReferenceState, StepKind, StepMarker,
 };
 use mapper_identify::DeclaredUncertainty;
-use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
-use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
+use mapper_physics::compressor_map::closed_form_map::{
+    CharacteristicPoint, ClosedFormMap, CompressorCharacteristic,
+};
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::{CompressionInputs, compress, isentropic_rise_ratio};
 use mapper_physics::machine::params::{BoundaryConditions, Params};

@@ -4,11 +4,10 @@ use crate::map_fit::MapFitError;
 use crate::map_fit::least_squares::observations::Observations;
 use crate::map_fit::least_squares::problem::PARAMETER_STEP;
 use crate::map_fit::least_squares::solution::Solution;
-use crate::map_fit::speed_lines::line_shape::{
+use crate::map_fit::speed_lines::{
     ANGLE_RANGE_RAD, DIFFERENCE_STEP_RAD, FlowFrame, LineShape, MIN_ANGLE_RAD, MIN_SQUARE_SLOPE, PARAMETERS,
-    Parameters, Scales, WORK, count_crossings, nearest, normal,
+    Parameters, Scales, SpeedSpline, WORK, count_crossings, nearest, normal,
 };
-use crate::map_fit::speed_lines::speed_spline::SpeedSpline;
 use mapper_core::{FittedLine, FittedMap, FittedNode};
 use mapper_numerics::root::bisect;
 use nalgebra::{DMatrix, DVector};

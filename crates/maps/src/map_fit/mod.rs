@@ -15,8 +15,7 @@ use fitted_surface::table;
 use least_squares::observations::Observations;
 use least_squares::solution::{Solution, solve};
 use mapper_core::{CompressorMap, FittedLine, FittedMap};
-use speed_lines::line_shape::count_crossings;
-use speed_lines::speed_spline::End;
+use speed_lines::{End, count_crossings};
 use std::collections::BTreeMap;
 
 impl MapFit {

@@ -7,7 +7,7 @@
 
 use crate::map_fit::fitted_surface::MapFit;
 use crate::map_fit::least_squares::observations::Observation;
-use crate::map_fit::speed_lines::speed_spline::{End, EndWidenings, Widening};
+use crate::map_fit::speed_lines::{End, EndWidenings, Widening};
 use mapper_core::LeftOutLine;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{NORMAL_975, median};

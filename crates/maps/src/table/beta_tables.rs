@@ -2,7 +2,7 @@
 //! Python, nested tables of NPSS.
 
 use crate::table::design_point::{MapDesign, design_of, flow_unit, interpolate, scale_to_design};
-use crate::table::reference::{efficiency_in_comment, reference_in_comment};
+use crate::table::quantity::{efficiency_in_comment, reference_in_comment};
 use crate::table::rows_to_lines::{Row, check_point_count, map_of_rows};
 use mapper_core::{CompressorMap, ImportError, ImportRemark, ImportedMap, MapDescription};
 

@@ -2,13 +2,11 @@
 
 pub(crate) mod beta_tables;
 pub(crate) mod column;
-pub(crate) mod described_columns;
 mod description;
 pub(crate) mod design_point;
 pub(crate) mod quantity;
 mod read;
 mod read_turbine;
-mod reference;
 mod rows_to_lines;
 mod sheet;
 
@@ -17,11 +15,11 @@ pub use description::{
     DescriptionError, description_from_yaml, description_text, read_description, set_key,
     turbine_description_text,
 };
-pub use read::{read_any_bytes, read_any_text, read_text, read_workbook};
-pub use read_turbine::{read_turbine_text, read_turbine_workbook, reduced_turbine_point};
-pub use reference::{
+pub use quantity::{
     DEFINITION_PREFIX, efficiency_in_comment, parse_reference, reference_in_comment, resolve_reference,
 };
+pub use read::{read_any_bytes, read_any_text, read_text, read_workbook};
+pub use read_turbine::{read_turbine_text, read_turbine_workbook, reduced_turbine_point};
 pub use rows_to_lines::{MAX_POINTS, Row, check_point_count, map_of_rows, shift_remark};
 pub use sheet::grid::text_of;
 pub use sheet::workbook::{file_text, text_of_lines, unpack};

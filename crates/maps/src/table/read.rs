@@ -3,16 +3,14 @@
 
 use crate::table::beta_tables::{read_arrays, read_gsp, read_modelica, read_nested};
 use crate::table::column::{Column, Machine};
-use crate::table::described_columns::DescribedColumns;
+use crate::table::description::DescribedColumns;
 use crate::table::design_point::{MapDesign, scale_to_design};
-use crate::table::quantity::Quantity;
-use crate::table::reference;
-use crate::table::reference::efficiency_in_comment;
+use crate::table::quantity;
+use crate::table::quantity::{Quantity, efficiency_in_comment};
 use crate::table::rows_to_lines::{Row, map_of_rows, shift_remark, surge_marks};
 use crate::table::sheet::grid::{Grid, text_of};
 use crate::table::sheet::layout::{self, Layout};
-use crate::table::sheet::matrices::points_of_matrices;
-use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points};
+use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points, points_of_matrices};
 use crate::table::sheet::workbook::grid_of_workbook;
 use mapper_core::unit_factors::PERCENT;
 use mapper_core::{
@@ -101,7 +99,7 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
     check_units_of_flow(grid, &layout)?;
     let notes = read_notes(grid, layout.first_row);
     let mut remarks = layout.remarks.clone();
-    let mut reference = reference::resolve_reference(notes.reference, description.reference);
+    let mut reference = quantity::resolve_reference(notes.reference, description.reference);
     // Reduced quantities and readings can be corrected to any state.
     if (layout.needs_no_reference() || layout.is_measured())
         && matches!(reference, Err(ImportError::NoReference))
@@ -393,7 +391,7 @@ pub(super) fn read_notes(grid: &Grid, first_row: usize) -> Notes {
         let text = row.text();
         notes.reference = notes
             .reference
-            .or_else(|| reference::reference_in_comment(&text))
+            .or_else(|| quantity::reference_in_comment(&text))
             .or_else(|| parse_reference_line(grid, &text));
         notes.efficiency = notes.efficiency.or_else(|| efficiency_in_comment(&text));
         if let Some((_, name)) =

@@ -1,10 +1,10 @@
 //! Reads a turbine map from a table of points, in all layouts of compressor maps.
 
 use crate::table::column::Machine;
-use crate::table::described_columns::DescribedColumns;
+use crate::table::description::DescribedColumns;
+use crate::table::quantity;
 use crate::table::quantity::Quantity;
 use crate::table::read::{check_units_of_flow, leave_out_standstill, pressure_pa, read_notes, require};
-use crate::table::reference;
 use crate::table::rows_to_lines::{ETA_RANGE, MAX_PRESSURE_RATIO};
 use crate::table::sheet::grid::Grid;
 use crate::table::sheet::layout;
@@ -70,7 +70,7 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, Im
     let is_corrected = measured.is_empty()
         && (all().any(|column| is_flow(column.quantity))
             || !speed_is_reduced && all().any(|column| column.quantity == Quantity::Speed));
-    let reference = match reference::resolve_reference(notes.reference, description.reference) {
+    let reference = match quantity::resolve_reference(notes.reference, description.reference) {
         Err(ImportError::NoReference) if !is_corrected => None,
         resolved => Some(resolved?),
     };

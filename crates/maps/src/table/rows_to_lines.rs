@@ -1,13 +1,13 @@
 //! Groups rows of a table into speed lines.
 
 use crate::assemble::{line, move_to_speed};
-use crate::table::reference;
+use crate::table::quantity;
 use mapper_core::{
     CommonErrors, CompressorMap, IdentifiedPoint, ImportError, ImportRemark, Method, PoorFit, ReferenceState,
     StepKind, SurgeFoundBy, SurgeMark, Verdict, Warning,
 };
 use mapper_numerics::statistics::range;
-use mapper_physics::compressor_map::characteristic::{MIN_TOP_SPEED_RPM, max_flow_kg_s};
+use mapper_physics::compressor_map::closed_form_map::{MIN_TOP_SPEED_RPM, max_flow_kg_s};
 use std::ops::RangeInclusive;
 
 /// Maximum number of points. Bound: memory; a map has some hundred.
@@ -148,7 +148,7 @@ pub fn map_of_rows(
     found: Option<ReferenceState>,
     given: Option<ReferenceState>,
 ) -> Result<CompressorMap, ImportError> {
-    let reference = reference::resolve_reference(found, given)?;
+    let reference = quantity::resolve_reference(found, given)?;
     if rows.is_empty() {
         return Err(ImportError::Empty);
     }

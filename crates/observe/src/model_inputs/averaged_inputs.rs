@@ -3,15 +3,14 @@
 //! In contrast to [`smoothed_inputs`](crate::model_inputs::smoothed_inputs), these keep the noise of means, which is independent between
 //! segments, and follow a step of an input sensor. The search for drift needs both properties.
 
-use crate::averages::{BEFORE_S, Schedule, Table};
-use crate::channels::{INPUT_CHANNELS, boundary_condition};
+use crate::averages::{BEFORE_S, INPUT_CHANNELS, Schedule, Table, boundary_condition};
 use crate::model_inputs::lagged_command::{
     LaggedCommand, Response, commanded_s, levels_of_step, measured_valve_response,
 };
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_numerics::statistics::mean;
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::simulation::inputs::{Inputs, InputsError, InterpolatedInputs};
+use mapper_physics::simulation::steady::{Inputs, InputsError, InterpolatedInputs};
 
 /// Time after a jump for which readings are not averaged, s. Bound: actuators need some tenths.
 const RAW_S: f64 = 3.0;
@@ -175,7 +174,7 @@ impl Nodes<'_> {
 mod tests {
     use super::*;
     use mapper_core::{Series, StepKind, StepMarker};
-    use mapper_physics::laws::orifice;
+    use mapper_physics::laws::turbine;
 
     /// A loop that holds the speed trims P3 by 2 kPa within some seconds of the jump. The inputs follow to a hundredth of that: the
     /// interpolation error between two half-second means is 16 Pa (curvature 2 kPa / (2 s)^2, over 8 x 0.5^2 s^2).
@@ -224,7 +223,7 @@ mod tests {
             values: t_s.iter().map(|t_s| value(*t_s)).collect(),
             t_s: t_s.clone(),
         };
-        let flow = |t_s: f64| orifice::flow_kg_s(2.4e-4 * truth(t_s), 160e3, 360.0, 100e3);
+        let flow = |t_s: f64| turbine::flow_kg_s(2.4e-4 * truth(t_s), 160e3, 360.0, 100e3);
         let step = |index: usize| {
             let start_s = 20.0 * index as f64;
             StepMarker {

@@ -2,10 +2,10 @@
 
 use crate::averages::{TIME_ROUNDING_S, Table};
 use mapper_core::{Channel, Recording, Series, StepMarker, is_jump, is_same_command};
-use mapper_numerics::minimise::minimise;
+use mapper_numerics::root::minimise;
 use mapper_numerics::statistics::{mean, median};
 use mapper_physics::gas::mixture::Gas;
-use mapper_physics::laws::orifice;
+use mapper_physics::laws::turbine;
 use mapper_physics::rig::instruments::ValveMotion;
 
 /// Lags after which a jump is almost complete. Bound: 0.25 % of it is left, exp(-6).
@@ -324,7 +324,7 @@ pub(crate) fn valve_areas_m2(
     let area_m2 = (0..table.t_s.len()).map(|i| {
         let p1_pa = p1.map_or(nominal_p1_pa, |p1| p1[i]);
         let filling_kg_s = outlet_volume_m3 * p2_slope_pa_s(i) / (Gas::AIR_GAS_CONSTANT_J_KGK * t2[i]);
-        (flow[i] - filling_kg_s) / orifice::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(MIN_FLUX)
+        (flow[i] - filling_kg_s) / turbine::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(MIN_FLUX)
     });
     Some(area_m2.collect())
 }
@@ -609,7 +609,7 @@ mod tests {
             put(Channel::P2, &|_| 160e3);
             put(Channel::T2, &|_| 360.0);
             put(Channel::CompressorFlow, &|t| {
-                orifice::flow_kg_s(2.4e-4 * command.valve_opening_ratio(t), 160e3, 360.0, 100e3)
+                turbine::flow_kg_s(2.4e-4 * command.valve_opening_ratio(t), 160e3, 360.0, 100e3)
             });
             let table = Table::new(&recording).unwrap();
             let p3 = measured_p3_response(&table, &recording, 80.0).unwrap();

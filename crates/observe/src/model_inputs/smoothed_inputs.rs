@@ -4,15 +4,14 @@
 //! quantities may jump with P3 (P4 does, because of the flow; the remainder, by the gain error of the transducer): regression gives that
 //! share, and the remainder is smooth. Jumps are not smoothed.
 
-use crate::averages::Table;
-use crate::channels::{INPUT_CHANNELS, boundary_condition};
+use crate::averages::{INPUT_CHANNELS, Table, boundary_condition};
 use crate::declared::Declared;
 use crate::model_inputs::lagged_command::{LaggedCommand, Response, commanded_s, levels_of_step};
 use crate::model_inputs::smoother::{TimeHistory, smooth};
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::MIN_VALUES;
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::simulation::steady::Inputs;
 
 /// Minimum variance of a jump's height, ratio to that of a sample. Bound: the height is a mean over at least ten samples.
 const HEIGHT_VARIANCE_RATIO: f64 = 0.1;

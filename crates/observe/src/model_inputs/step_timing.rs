@@ -7,7 +7,7 @@
 use crate::averages::{TIME_ROUNDING_S, Table};
 use crate::model_inputs::lagged_command::{LaggedCommand, Level, Response, levels_of_step};
 use mapper_core::{Channel, Recording, StepMarker, is_same_command};
-use mapper_numerics::minimise::minimise;
+use mapper_numerics::root::minimise;
 use mapper_numerics::statistics::{DOUBT_SIGMAS, mean, median, rms, robust_sigma};
 use std::ops::Range;
 

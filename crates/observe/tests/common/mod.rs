@@ -3,9 +3,9 @@
 
 use mapper_core::{Channel, DeclaredUncertainty, Element, Recording, RedundantSensors, Series};
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::{Simulator, Watch};
+use mapper_physics::simulation::steady::Inputs;
 use mapper_physics::{laws::thermocouple, simulation::steady};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};

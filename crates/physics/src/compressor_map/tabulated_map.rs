@@ -4,7 +4,7 @@
 //! surge end), so that lines of different speed can be blended at equal x. Beyond the outermost lines similarity applies:
 //! flow in proportion to speed, isentropic head to its square. This extrapolation is only for the run-up of a machine.
 
-use crate::compressor_map::characteristic::{
+use crate::compressor_map::closed_form_map::{
     CharacteristicPoint, CompressorCharacteristic, MAX_SPEED_RPM, MIN_TOP_SPEED_RPM, head_ratio as head,
     max_flow_kg_s, pressure_ratio_of_head,
 };

@@ -3,6 +3,5 @@
 pub mod compression;
 pub mod convection;
 pub mod housing;
-pub mod orifice;
 pub mod thermocouple;
 pub mod turbine;

@@ -3,9 +3,9 @@
 use crate::machine::params::BoundaryConditions;
 use crate::operating_point::settled::{settled_count, with_bands};
 use crate::operating_point::transition::TransitionInputs;
-use crate::simulation::inputs::Inputs;
 use crate::simulation::model::{Model, State};
 use crate::simulation::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, SimulationError, Simulator, Watch};
+use crate::simulation::steady::Inputs;
 use mapper_core::{AvoidedCrossing, AvoidedSpeeds, AvoidedTime, Predicted, SettleBands, WindowRule};
 
 /// Interval of a forecast's samples, s.

@@ -5,7 +5,7 @@
 //! margin ([`SteadyState::surge_margin_ratio`]). The points between them are evenly spaced in corrected flow.
 //!
 //! **The opening.** At a given speed and flow the map gives P2. The valve is the orifice of
-//! [`orifice`](crate::laws::orifice), whose flow is in proportion to its opening, so that `opening = m_c / m_orifice(P2, T2, 1)`.
+//! [`orifice`](crate::laws::turbine), whose flow is in proportion to its opening, so that `opening = m_c / m_orifice(P2, T2, 1)`.
 //! T2 depends on the housings, which depend on the flow: opening and [steady state](crate::simulation::steady) are computed alternately; each
 //! round reduces the difference to some per cent.
 

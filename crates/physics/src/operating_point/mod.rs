@@ -4,6 +4,5 @@ pub mod forecast;
 pub mod line_points;
 pub mod reach;
 pub mod settled;
-pub mod speed_response;
 pub mod transition;
 pub mod transition_forecast;

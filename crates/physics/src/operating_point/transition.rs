@@ -6,9 +6,8 @@
 //! have arrived.
 
 use crate::machine::params::BoundaryConditions;
-use crate::simulation::inputs::Inputs;
 use crate::simulation::model::Model;
-use crate::simulation::steady::SteadyState;
+use crate::simulation::steady::{Inputs, SteadyState};
 use mapper_core::{ActuatorMotion, Ramp, Ramps, RigActuators};
 
 /// Time constants of the shaft after which a waiting follower starts. Judgement: 2 % of the change of speed remain.

@@ -5,13 +5,13 @@
 //! changes; each step is one of [Rodas5P](crate::simulation::rosenbrock), which is L-stable, so that the outlet volume (milliseconds)
 //! does not limit it.
 
-use crate::compressor_map::characteristic::CharacteristicPoint;
+use crate::compressor_map::closed_form_map::CharacteristicPoint;
 use crate::machine::params::BoundaryConditions;
 use crate::machine::state::MAX_STATES;
-use crate::simulation::inputs::Inputs;
 use crate::simulation::model::{Model, Outputs, PreparedModel, State};
 use crate::simulation::rosenbrock::{Integrator, OdeSystem, Step};
 use crate::simulation::simulate::tolerances;
+use crate::simulation::steady::Inputs;
 use nalgebra::{Const, DimMin};
 
 /// Maximum length of a step: a share of the time since the jump within these limits, s. P2 changes within milliseconds of a jump; later

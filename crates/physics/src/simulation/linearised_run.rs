@@ -11,9 +11,9 @@ use crate::machine::state::MAX_STATES;
 use crate::simulation::driven::{
     DriveError, FrozenGrid, GRID_TOLERANCE, drive_steps, is_physical, last_of_step_s,
 };
-use crate::simulation::inputs::Inputs;
 use crate::simulation::model::{Model, Outputs, PreparedModel, State};
 use crate::simulation::simulate::STATE_SIZES;
+use crate::simulation::steady::Inputs;
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::SQRT_2;
 

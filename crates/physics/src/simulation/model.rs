@@ -1,9 +1,9 @@
 //! The lumped turbocharger: shaft, outlet volume, two housings, and the gas paths between them.
 
-use crate::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+use crate::compressor_map::closed_form_map::{CharacteristicPoint, CompressorCharacteristic};
 use crate::gas::air;
-use crate::laws::turbine::{TurbineInlet, TurbineState, friction_power_w};
-use crate::laws::{compression, convection, housing, orifice, thermocouple};
+use crate::laws::turbine::{self, TurbineInlet, TurbineState, friction_power_w};
+use crate::laws::{compression, convection, housing, thermocouple};
 use crate::machine::hooks::{HookList, Hooks, Site};
 pub use crate::machine::params::BoundaryError;
 use crate::machine::params::{BoundaryConditions, Params};
@@ -283,7 +283,7 @@ impl PreparedModel<'_> {
                 state.tt_k,
             ),
             valve_flow_kg_s: self.flow_ratio
-                * orifice::flow_kg_s(
+                * turbine::flow_kg_s(
                     boundary.valve_opening_ratio
                         * params.outlet.discharge_coefficient
                         * params.outlet.valve_area_m2,

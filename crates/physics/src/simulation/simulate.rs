@@ -2,9 +2,9 @@
 
 use crate::machine::params::{BoundaryConditions, Params};
 use crate::machine::state::MAX_STATES;
-use crate::simulation::inputs::Inputs;
 use crate::simulation::model::{BoundaryError, Model, Outputs, PreparedModel, State};
 use crate::simulation::rosenbrock::{IntegrationError, Integrator, OdeSystem, Step, Tolerances};
+use crate::simulation::steady::Inputs;
 use mapper_numerics::root::bisect;
 use nalgebra::{Const, DimMin};
 

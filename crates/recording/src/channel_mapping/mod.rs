@@ -2,5 +2,4 @@
 
 pub(crate) mod channel_map;
 pub(crate) mod channel_map_yaml;
-pub(crate) mod mapped_topics;
 pub(crate) mod plausibility;

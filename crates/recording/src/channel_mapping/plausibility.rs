@@ -1,7 +1,7 @@
 //! Checks readings against the units of the channel map, before anything is computed from them.
 
 use crate::channel_mapping::channel_map_yaml::MapMistakes;
-use crate::logs::plausible::{AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, looks_like_gauge};
+use crate::logs::finding::{AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, looks_like_gauge};
 use crate::logs::proposal::short;
 use crate::{AmbientPressure, ChannelSource};
 use mapper_core::unit_factors::PA_PER_KPA;

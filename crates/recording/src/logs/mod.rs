@@ -3,11 +3,10 @@
 //! A [`LogFormat`] recognises a file by its first bytes and opens it as a [`Log`]: a [`Layout`] of groups and columns, and the rows of
 //! the requested columns, one after the other.
 
-mod finding;
+pub(crate) mod finding;
 mod format;
 pub mod limits;
 mod options;
-pub mod plausible;
 pub mod proposal;
 mod survey;
 

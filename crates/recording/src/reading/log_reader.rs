@@ -1,7 +1,7 @@
 //! Reads a log of another program with a channel map.
 
+use crate::channel_mapping::channel_map::{MappedQuantity, source_of, sources};
 use crate::channel_mapping::channel_map_yaml::MapMistakes;
-use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of, sources};
 use crate::logs::{Layout, LogFile, Row};
 use crate::samples::log_clock::{BlockAverager, LogClock};
 use crate::samples::series_builder::SeriesBuilder;

@@ -1,7 +1,7 @@
 //! Reads a recording of this or another program.
 
+use crate::channel_mapping::channel_map::{MappedQuantity, source_of, sources};
 use crate::channel_mapping::channel_map_yaml::MapMistakes;
-use crate::channel_mapping::mapped_topics::{MappedQuantity, source_of, sources};
 use crate::channel_mapping::plausibility;
 use crate::channel_mapping::plausibility::Readings;
 use crate::jump_steps::{drop_rest_steps, hold_at_step_ends, reversal_share};
@@ -12,7 +12,7 @@ use crate::samples::clock_steps::{repair_gaps, repair_set_back, repair_set_forwa
 use crate::samples::rig_sink::{PositionedMessage, RigSink};
 use crate::samples::series_builder::{SeriesBuilder, run_time_s};
 use crate::steps::{find_steps, hollow_steps, span_s, steps_from_markers};
-use crate::writing::recording_file::OriginMessage;
+use crate::writing::topics::OriginMessage;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError};
 use mapper_core::unit_factors::PERCENT;
 use mapper_core::{

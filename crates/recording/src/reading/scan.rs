@@ -1,10 +1,9 @@
 //! One pass over a recording within limits: finds the recoverable data and forwards them.
 
 use crate::logs::LogFormats;
-use crate::mcap::chunk::{Batch, ChunkError, Item, UnpackedChunk, Unpacker};
-use crate::mcap::records::{
-    ChannelDefinition, Frame, FrameReader, MAGIC, Sink, op, parse_attachment, parse_channel, parse_message,
-    parse_metadata, parse_schema, split_record,
+use crate::mcap::{
+    Batch, ChannelDefinition, ChunkError, Frame, FrameReader, Item, MAGIC, Sink, UnpackedChunk, Unpacker, op,
+    parse_attachment, parse_channel, parse_message, parse_metadata, parse_schema, split_record,
 };
 use crate::{DamagedPart, ReadWarning, RecordError};
 use std::collections::BTreeMap;

@@ -5,7 +5,7 @@
 //! value at the same slope, the clock was set. A constant reading is no evidence.
 
 use crate::ReadWarning;
-use crate::channel_mapping::mapped_topics::MappedQuantity;
+use crate::channel_mapping::channel_map::MappedQuantity;
 use crate::samples::log_clock::{MAX_BACK_INTERVALS, MAX_BACK_S};
 use crate::samples::rig_sink::PositionedMessage;
 use crate::samples::series_builder::{ClockBreak, SeriesBuilder};

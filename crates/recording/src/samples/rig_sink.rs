@@ -1,12 +1,12 @@
 //! Collects samples, steps and events of a recording, and ignores truth.
 
-use crate::channel_mapping::mapped_topics::{MappedQuantity, MappedTopic, map_topic};
-use crate::mcap::records::{ChannelDefinition, FieldValue, Sink, read_fields};
+use crate::channel_mapping::channel_map::{MappedQuantity, MappedTopic, map_topic};
+use crate::mcap::{ChannelDefinition, FieldValue, Sink, read_fields};
 use crate::samples::series_builder::SeriesBuilder;
 use crate::steps::StepMessage;
-use crate::writing::recording_file::{OriginMessage, read_origins};
 use crate::writing::topics::{
-    CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, PLAN_NAME, PROVENANCE_TOPIC, START_KEY, STEP_TOPIC,
+    CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, OriginMessage, PLAN_NAME, PROVENANCE_TOPIC,
+    START_KEY, STEP_TOPIC, read_origins,
 };
 use crate::{ChannelMap, FormatVersion, ReadWarning, RecordError};
 use mapper_core::Event;

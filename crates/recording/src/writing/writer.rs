@@ -1,10 +1,8 @@
 //! Writes a recording: one message per device group and sample, flushed each second of the run's clock.
 
-use crate::writing::recording_file::{
-    McapFile, OpenedFile, ProvenanceWriter, RecordingHeader, add_channel, io_error, open,
-};
 use crate::writing::topics::{
-    ELEMENTS_TOPIC, Field, StepPhase, TRUTH_TOPIC, Topic, event_message, step_message,
+    ELEMENTS_TOPIC, Field, McapFile, OpenedFile, ProvenanceWriter, RecordingHeader, StepPhase, TRUTH_TOPIC,
+    Topic, add_channel, event_message, io_error, open, step_message,
 };
 use crate::{BatchError, RecordError};
 use mapper_core::unit_factors::NS_PER_S;

@@ -1,7 +1,6 @@
 //! The diagnosis of a gap between rig and nominal model.
 
-use crate::diagnosis::gap_figures::{heat_table, residual_maps, traces};
-use crate::diagnosis::gap_next::next_section;
+use crate::diagnosis::gap_next::{heat_table, next_section, residual_maps, traces};
 use crate::diagnosis::stand_actions::{next_measurement, stand_actions};
 use crate::document::{Cell, Describe, Document, Table};
 use crate::formatting::{Message, display_scale, four_figures};

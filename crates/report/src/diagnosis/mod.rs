@@ -1,7 +1,6 @@
 //! Results of gap and drift diagnosis for the engineer: probable causes, next steps, checked predictions, corrected points.
 
 pub(crate) mod drift;
-pub(crate) mod gap_figures;
 pub(crate) mod gap_next;
 pub(crate) mod gap_results;
 pub(crate) mod gap_text;

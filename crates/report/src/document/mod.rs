@@ -4,12 +4,11 @@
 //! three say the same. Text between backticks is code in all of them.
 
 mod html;
-mod markdown;
 mod model;
 mod sentence;
 mod terminal;
 
-pub use markdown::{markdown_table, markdown_text};
+pub use html::{markdown_table, markdown_text};
 pub(crate) use model::verdict_word;
 pub use model::{Cell, Describe, Document, Table};
 pub(crate) use sentence::{Sentence, number, sentence, signed};

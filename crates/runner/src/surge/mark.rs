@@ -140,7 +140,7 @@ fn pressure_ratio_at(readings: &[SurgeReading], last: &SurgeReading, flow_kg_s: 
     let last_readings = &readings[readings.len().saturating_sub(LAST_READINGS)..];
     let point = |reading: &SurgeReading| {
         let factor = last.speed_corrected_rpm / reading.speed_corrected_rpm;
-        let (flow, ratio) = mapper_physics::compressor_map::characteristic::at_speed(
+        let (flow, ratio) = mapper_physics::compressor_map::closed_form_map::at_speed(
             reading.flow_corrected_kg_s,
             reading.pressure_ratio,
             factor,

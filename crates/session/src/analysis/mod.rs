@@ -2,7 +2,6 @@
 
 pub(crate) mod calibrated_model;
 pub(crate) mod drift;
-pub(crate) mod experiments;
 pub(crate) mod gap;
 pub(crate) mod identification;
 pub(crate) mod pdf;

@@ -10,8 +10,9 @@ use mapper_campaign::{
 };
 use mapper_chart::efficiency_mesh::{InterpolatedLine, SUBDIVISIONS, interpolated_lines};
 use mapper_core::{ImportError, NAMED_REFERENCES, ReferenceState, one_line};
-use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
-use mapper_physics::compressor_map::closed_form_map::{ClosedFormMap, TURBO_A_WHEEL_M};
+use mapper_physics::compressor_map::closed_form_map::{
+    ClosedFormMap, CompressorCharacteristic, TURBO_A_WHEEL_M,
+};
 use mapper_report::significant_digits;
 use serde::Serialize;
 use std::io::{Error, ErrorKind};

@@ -1,15 +1,16 @@
-//! Starts the runner with steps, a rig and observers. No other module does, so that every run has the same guards.
+//! Drives a rig, with the guards that it lacks.
 
-use crate::rig::guards::make_guards;
-use mapper_campaign::Campaign;
-use mapper_core::{Backend, Channel, Clock, PlanStep, RunEnding, UnpacedClock};
+use crate::SessionError;
+use mapper_campaign::{Campaign, DEFAULT_MAX_AGE_S};
+use mapper_core::{Backend, Channel, Clock, GuardName, PlanStep, RigDescription, RunEnding, UnpacedClock};
 use mapper_physics::laws::thermocouple;
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::operating_point::speed_response::speed_response;
+use mapper_physics::operating_point::settled::speed_response;
 use mapper_physics::simulation::model::Model;
 use mapper_runner::{
-    Operator, Protection, ReadingBounds, RunError, RunObserver, Runner, SoakSource, SpeedControl,
-    SpeedControlLimits, StandMotion, StepSource, UnguardedChannel,
+    AvoidedSpeedWatch, BatchWatch, Guard, Operator, Protection, REQUIRED_CHANNELS, ReadingBounds, RigWatch,
+    RunError, RunObserver, Runner, SignalWatch, SilenceWatch, SoakSource, SpeedControl, SpeedControlLimits,
+    StandMotion, StartCheck, StepSource, SurgeWatch, UnguardedChannel,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -172,4 +173,83 @@ fn speed_control<'a>(campaign: &'a Campaign, model: &'a Model) -> Option<SpeedCo
 /// Soak time before the plan begins, s.
 pub fn soak_s(campaign: &Campaign) -> f64 {
     campaign.zero.map_or(0.0, |zero| zero.duration_s)
+}
+
+/// Makes the guards for a run of this campaign on this rig. A default guard is omitted if the rig does not deliver its signal. Declared and
+/// required guards are always included; they trip if their signal is missing.
+pub fn make_guards(
+    campaign: &Campaign,
+    rig: &RigDescription,
+    auxiliary_channels: &[UnguardedChannel],
+) -> Vec<Box<dyn Guard>> {
+    let set = campaign.guard_set();
+    let guarded: Vec<Channel> = set.signals.iter().map(|spec| spec.channel).collect();
+    let mut guards: Vec<Box<dyn Guard>> = vec![Box::new(BatchWatch::default())];
+    for spec in set.signals {
+        let required = campaign.guards.is_some() || rig.needs_guarded.contains(&spec.name);
+        if required || rig.channels.contains(&spec.channel) {
+            guards.push(Box::new(SignalWatch::new(spec)));
+        }
+    }
+    if !campaign.limits.avoid.is_empty() {
+        guards.push(Box::new(AvoidedSpeedWatch::new(campaign.limits.avoid)));
+    }
+    guards.extend(set.surge.map(|spec| Box::new(SurgeWatch::new(spec)) as Box<dyn Guard>));
+    if rig.controls {
+        let mut watched = auxiliary_channels.to_vec();
+        let is_new = |channel: &&Channel| {
+            !guarded.contains(channel) && !auxiliary_channels.iter().any(|other| other.channel == **channel)
+        };
+        let required = REQUIRED_CHANNELS.iter().filter(|channel| rig.channels.contains(channel));
+        watched.extend(required.filter(is_new).map(|channel| UnguardedChannel {
+            source: rig.backend.clone(),
+            channel: *channel,
+            age_s: max_age_s(campaign, rig),
+            frozen: None,
+        }));
+        for one in watched.iter_mut().filter(|one| one.channel == Channel::CompressorFlow) {
+            one.frozen = set.frozen_flow;
+        }
+        guards.push(Box::new(SilenceWatch::new(watched)));
+        guards.push(Box::new(RigWatch::default()));
+        guards.push(Box::new(StartCheck::new(rig.channels.clone())));
+    }
+    guards
+}
+
+/// Number of samples that a source may miss before it counts as silent.
+const MAX_MISSED_SAMPLES: f64 = 3.0;
+
+/// Age after which a channel of this source is silent, s.
+pub(crate) fn max_age_s(campaign: &Campaign, source: &RigDescription) -> f64 {
+    let age_s = campaign.guard_set().signals.first().map_or(DEFAULT_MAX_AGE_S, |guard| guard.age_s);
+    age_s.max(MAX_MISSED_SAMPLES / source.sample_rate_hz.max(1e-3))
+}
+
+/// Checks that every guard the rig requires is present, and that its channel is delivered.
+///
+/// # Errors
+/// [`SessionError::MissingGuards`] with all missing guards, [`SessionError::GuardWithoutChannel`] with the channels.
+pub fn check_guards(campaign: &Campaign, rig: &RigDescription) -> Result<(), SessionError> {
+    let set = campaign.guard_set();
+    let missing: Vec<GuardName> =
+        rig.needs_guarded.iter().copied().filter(|name| !set.ends_on(*name)).collect();
+    if !missing.is_empty() {
+        let names = missing.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        return Err(SessionError::MissingGuards { backend: rig.backend.clone(), guards: names });
+    }
+    let is_required = |name: &GuardName| campaign.guards.is_some() || rig.needs_guarded.contains(name);
+    let without_channel: Vec<String> = set
+        .signals
+        .iter()
+        .filter(|spec| is_required(&spec.name) && !rig.channels.contains(&spec.channel))
+        .map(|spec| format!("{} (guard `{}`)", spec.channel, spec.name))
+        .collect();
+    if without_channel.is_empty() {
+        return Ok(());
+    }
+    Err(SessionError::GuardWithoutChannel {
+        backend: rig.backend.clone(),
+        channels: without_channel.join(", "),
+    })
 }

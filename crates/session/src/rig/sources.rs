@@ -1,6 +1,6 @@
 //! The data sources of a campaign: the rig and auxiliary instruments.
 
-use crate::rig::guards::max_age_s;
+use crate::rig::drive::max_age_s;
 use crate::{Registry, SessionError};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::ReaderChoice;

@@ -10,7 +10,7 @@ use mapper_diagnose::gap::{
     Calibration, ClosureSearch, Diagnosed, EffectVisibility, GapRequest, Origin, RigRecording, Scores,
     Verdict,
 };
-use mapper_numerics::minimise::minimise;
+use mapper_numerics::root::minimise;
 use mapper_numerics::statistics::{NORMAL_975, quantile};
 use mapper_observe::Declared;
 use mapper_physics::rig::effect::Effect;

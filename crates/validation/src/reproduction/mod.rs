@@ -2,7 +2,6 @@
 //!
 //! [`reproduce`] returns data and pictures. The same program gives the same bytes at any time and on any computer.
 
-mod figure_data;
 mod figures;
 mod lab;
 #[cfg(test)]
@@ -10,8 +9,8 @@ mod lab;
 mod model_table;
 mod picture;
 
-pub use crate::reproduction::figure_data::ReproduceError;
-pub use figure_data::{FigureResult, Statement, Table, Verdict, picture_path};
+pub use crate::reproduction::lab::ReproduceError;
+pub use lab::{FigureResult, Statement, Table, Verdict, picture_path};
 pub use picture::{figure_json, reproduction_page};
 
 /// Numbers of the reproduced figures, in order.

@@ -1,7 +1,7 @@
 //! Common parts of the pictures.
 
 use crate::reproduction::lab::{JUMPS, Outcome, extremes};
-use crate::reproduction::{FigureResult, figure_data, picture_path};
+use crate::reproduction::{FigureResult, lab, picture_path};
 use mapper_chart::{Axis, Colour, Dash, Line, Marker, Panel, Scatter, palette};
 use mapper_numerics::statistics::range;
 use mapper_report::{Table, markdown_table};
@@ -105,7 +105,7 @@ pub(crate) fn span_at_speed(
     value: fn(&Outcome) -> Option<f64>,
     decimals: usize,
 ) -> String {
-    figure_data::range(extremes(at_speed(outcomes, speed_rpm).map(value)), decimals)
+    lab::range(extremes(at_speed(outcomes, speed_rpm).map(value)), decimals)
 }
 
 /// The outcomes at one target speed.

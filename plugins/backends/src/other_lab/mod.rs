@@ -5,10 +5,9 @@
 mod machine;
 mod motion;
 mod settings_file;
-mod structure;
 
 pub use motion::apply_structure;
-pub use structure::{NAME, OtherStructure};
+pub use machine::{NAME, OtherStructure};
 
 use crate::virtual_lab::VirtualLab;
 use mapper_core::{Backend, BackendError};

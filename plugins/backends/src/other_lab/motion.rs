@@ -1,15 +1,12 @@
 //! Integration of the machine of this lab, and its equations in the rig of the virtual lab.
 
-use crate::other_lab::machine::{SIZES, STATES, evaluate, lumped_state, start};
-use crate::other_lab::structure::{NAME, OtherStructure};
+use crate::other_lab::machine::{NAME, OtherStructure, SIZES, STATES, evaluate, lumped_state, start};
 use crate::virtual_lab::{LabInputs, LabSettings, RunningMachine, SecondOrder, Structure, StructureError};
 use mapper_physics::machine::params::{BoundaryConditions, Params};
-use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::simulation::steady::Inputs;
 use mapper_physics::simulation::model::{Model, Outputs, State};
 use mapper_physics::simulation::rosenbrock::{Integrator, OdeSystem, Tolerances};
-use mapper_physics::simulation::simulate::{
-    Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch,
-};
+use mapper_physics::simulation::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch};
 use mapper_physics::simulation::steady;
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! Settings of the lab in a campaign, below `backend: {other_lab: ...}`: all keys of the virtual lab, and `structure`.
 
 use super::motion::apply_structure;
-use super::structure::{NAME, OtherStructure};
+use crate::other_lab::machine::{NAME, OtherStructure};
 use crate::virtual_lab::{LabSettings, SettingProblem, check_range, read_settings};
 use mapper_core::BackendError;
 use mapper_physics::rig::backend_plugin::NominalRig;

@@ -2,25 +2,20 @@
 
 pub(crate) mod effects_file;
 mod lab;
-mod name;
 mod rig;
 mod samples;
 mod sensors;
 pub(crate) mod setting_problem;
-mod settings;
 pub(crate) mod settings_file;
 
 pub use crate::virtual_lab::sensors::{LabElement, LabElements, SecondOrder, SensorErrors};
 pub use lab::VirtualLab;
-pub use name::NAME;
 pub use rig::actuator::ActuatorDynamics;
 pub use rig::drift::{DriftTarget, LabDrift, Weather};
-pub use rig::precursor::SurgePrecursor;
-pub use rig::running::{LabInputs, RunningMachine, Structure, StructureError};
+pub use rig::running::{LabInputs, RunningMachine, Structure, StructureError, SurgePrecursor};
 pub use rig::tolerances::draw_tolerances;
-pub use setting_problem::{SettingProblem, check_range};
-pub use settings::{LabSettings, Start};
-pub use settings_file::read_settings;
+pub use setting_problem::{NAME, SettingProblem, check_range};
+pub use settings_file::{LabSettings, Start, read_settings};
 
 use mapper_core::{Backend, BackendError};
 use mapper_physics::rig::backend_plugin::{BackendPlugin, NominalRig};

@@ -2,9 +2,9 @@
 //! True values are known only to the simulator, sample by sample: they are recorded under /truth and read by scoring alone.
 
 use crate::virtual_lab::rig::drift;
-use crate::virtual_lab::rig::precursor::{P2_SHARE, Resonator, Swing};
+use crate::virtual_lab::rig::running::{P2_SHARE, Resonator, Swing};
 use crate::virtual_lab::sensors::{ElementBank, SecondOrderFollower, Sensor};
-use crate::virtual_lab::settings::LabSettings;
+use crate::virtual_lab::settings_file::LabSettings;
 use mapper_core::{
     CHANNELS, Channel, ChannelColumn, ElementColumn, Event, MODELLED_CHANNELS, SampleBatch, Setpoints,
     TruthColumn,

@@ -1,6 +1,5 @@
-//! Errors of values below `virtual_lab:`.
+//! Mistakes in the settings of the virtual lab.
 
-use crate::virtual_lab::name::NAME;
 use mapper_core::{BackendError, Channel, with_unit};
 use mapper_physics::rig::effect::EffectError;
 use mapper_yaml::units::{Kind, UnitError};
@@ -68,3 +67,6 @@ pub fn check_range(value: f64, unit: &'static str, range: RangeInclusive<f64>) -
     }
     Err(SettingProblem::OutOfRange { value, unit, low: *range.start(), high: *range.end() })
 }
+
+/// Name of this backend in campaigns.
+pub const NAME: &str = "virtual_lab";

@@ -22,7 +22,6 @@
 
 mod about;
 mod armed;
-mod refusal;
 mod server;
 mod serving;
 mod settings;
@@ -30,8 +29,7 @@ mod settings;
 mod socket;
 
 pub use about::{About, SOCKET};
-pub use refusal::Outage;
-pub use settings::{SecretError, address, by_channel, secret};
+pub use settings::{Outage, SecretError, address, by_channel, secret};
 pub use socket::serve;
 #[cfg(unix)]
 pub use socket::serve_at;

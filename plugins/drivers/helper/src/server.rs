@@ -1,7 +1,7 @@
 //! The driver's reaction to each message and each tick; time is an argument.
 
 use crate::armed::{Armed, Descent, make_safe};
-use crate::refusal::{Refusal, call_author_code, missing_settings, read_params, refusal, write_result};
+use crate::settings::{Refusal, call_author_code, missing_settings, read_params, refusal, write_result};
 use mapper_core::{Backend, BackendError, RigDescription, Setpoints};
 use mapper_driver_host::protocol::{
     Code, Configure, DescribeResult, FRAME_LIMIT_BYTES, Hello, LEASE_S, LastSample, MAGIC, Message, Poll,

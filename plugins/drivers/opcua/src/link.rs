@@ -2,8 +2,7 @@
 
 use crate::login::{check_reachable, try_login};
 use crate::settings::{Security, User};
-use crate::store::{APPLICATION_URI, Store, StoreError, fingerprint, server};
-use crate::value::{describe_status, is_written};
+use crate::store::{APPLICATION_URI, Store, StoreError, describe_status, fingerprint, is_written, server};
 use futures::{StreamExt, pin_mut};
 use mapper_controller::Target;
 use opcua::client::services::Read;

@@ -4,19 +4,17 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod commands;
 mod link;
 mod login;
 mod rig;
 mod settings;
 mod store;
-mod value;
 
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     if std::env::args_os().nth(1).is_some_and(|first| first != mapper_driver::SOCKET) {
-        return commands::run();
+        return rig::run();
     }
     let about = mapper_driver::About {
         name: settings::NAME,

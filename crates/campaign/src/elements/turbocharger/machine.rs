@@ -271,7 +271,7 @@ pub fn nominal_table(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
+    use mapper_physics::compressor_map::closed_form_map::CompressorCharacteristic;
     use proptest::prelude::*;
 
     const SAMPLE: &str = "RPM,WC,PRC,ETAC\n50000,0.04,1.31,0.58\n50000,0.06,1.30,0.63\n50000,0.08,1.2,0.6\n\

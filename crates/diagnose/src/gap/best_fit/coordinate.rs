@@ -1,7 +1,7 @@
 //! Search coordinates of effect parameters, and hypotheses as vectors of unknowns.
 
 use crate::gap::residuals::nuisance::Hypothesis;
-use mapper_numerics::least_squares::descent::step_bounds_within;
+use mapper_numerics::least_squares::step_bounds_within;
 use mapper_physics::rig::effect::{Effect, EffectInfo, EffectParameter};
 use nalgebra::DVector;
 use std::sync::Arc;

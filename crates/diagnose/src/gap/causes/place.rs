@@ -5,11 +5,11 @@
 //! shares add up to 1. A fault-free part has no share, because another part explains the gap better.
 
 use crate::gap::best_fit::fit::Fit;
-use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::prior_of_number;
 use crate::gap::findings::report::Place;
 use crate::gap::residuals::nuisance::OUTPUTS;
-use crate::gap::residuals::point_state::PointState;
+use crate::gap::residuals::prediction::PointState;
 use crate::gap::residuals::study::{Study, members};
 use crate::gap::residuals::whiten::{Linearised, NO_ENERGY};
 use mapper_core::unit_factors::RPM_PER_KRPM;

@@ -3,8 +3,7 @@
 use crate::gap::best_fit::coordinate::Coordinate;
 use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit};
 use crate::gap::best_fit::normal::Selection;
-use crate::gap::causes::additions::{Addition, additions};
-use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::additions::{Addition, Calibration, additions};
 use crate::gap::causes::probabilities::{prior, weight};
 use crate::gap::residuals::nuisance::onset_step;
 use crate::gap::residuals::study::{PredictError, Study, members};
@@ -12,7 +11,7 @@ use crate::gap::residuals::whiten::Linearised;
 use mapper_core::half_width_95;
 use mapper_inference::hypotheses::MAX_MEMBERS;
 use mapper_inference::search::{Causes, Extension, Known, Limits, climb, extend};
-use mapper_numerics::least_squares::descent::ROUNDS;
+use mapper_numerics::least_squares::ROUNDS;
 
 #[derive(Clone, Copy)]
 pub(crate) struct Search<'a> {

@@ -2,4 +2,3 @@
 
 pub(crate) mod experiment;
 pub(crate) mod report;
-pub(crate) mod warning;

@@ -1,7 +1,6 @@
 //! Diagnosis report, machine-readable.
 
-use crate::gap::findings::experiment::{AlsoChanged, Experiment};
-use crate::gap::findings::warning::{GapWarning, OffsetAtRest};
+use crate::gap::findings::experiment::{AlsoChanged, Experiment, GapWarning, OffsetAtRest};
 use crate::gap::model_error::baseline::Baseline;
 use mapper_core::unit_factors::{CM2_PER_M2, G_PER_KG, MM_PER_M, PERCENT};
 use mapper_core::{probability_text, with_unit};

@@ -2,17 +2,16 @@
 
 use crate::gap::best_fit::fit::MAX_SIGMAS;
 use crate::gap::best_fit::normal::{Selection, dot_over, nuisance_products};
-use crate::gap::findings::warning::GapWarning;
+use crate::gap::findings::experiment::GapWarning;
 use crate::gap::model_error::structure::{covariance_of_errors, variation};
-use crate::gap::preconditions::{GapError, Problem, another_machine, checked_study};
-use crate::gap::prepare::Zeroed;
+use crate::gap::preconditions::{GapError, Problem, Zeroed, another_machine, checked_study};
 use crate::gap::residuals::nuisance::{Hypothesis, JUMP_S, NuisanceKind, OUTPUTS, nuisances};
 use crate::gap::residuals::study::{Group, PredictError, Study};
 use crate::gap::residuals::whiten::{Linearised, dot};
 use mapper_core::unit_factors::PA_PER_KPA;
 use mapper_core::{Channel, jump_ratio};
 use mapper_identify::LONGEST_BRIDGE_S;
-use mapper_numerics::least_squares::descent::ROUNDS;
+use mapper_numerics::least_squares::ROUNDS;
 use mapper_numerics::statistics::mean;
 use mapper_observe::averages::mean_reading;
 use mapper_observe::model_inputs::step_timing::with_command_times;

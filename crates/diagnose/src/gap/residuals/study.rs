@@ -1,15 +1,16 @@
 //! One prepared recording: residual layout, whitening, and model predictions for any hypothesis.
 
-use crate::gap::residuals::machine_run::{MachineRun, acts_on_machine};
-use crate::gap::residuals::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, nuisances};
+use crate::gap::residuals::nuisance::{
+    Circumstances, Nuisance, OUTPUTS, SHAPES, ShapedMap, apply, from_step, growing_from, nuisances,
+    onset_step,
+};
 pub(crate) use crate::gap::residuals::nuisance::{EffectValues, Hypothesis, members};
-use crate::gap::residuals::nuisance::{from_step, growing_from, onset_step};
-use crate::gap::residuals::shape::{SHAPES, ShapedMap};
-use crate::gap::residuals::true_inputs::{Actuators, SurroundingsHistory, rested};
+use crate::gap::residuals::true_inputs::{
+    Actuators, MachineRun, SurroundingsHistory, acts_on_machine, rested,
+};
 use mapper_core::{Channel, Recording, StepMarker};
-use mapper_inference::time_history::TimeHistory;
-use mapper_observe::averages::{Block, Schedule, Table, block_mean, blocks};
-use mapper_observe::channels::INPUT_CHANNELS;
+use mapper_inference::hypotheses::TimeHistory;
+use mapper_observe::averages::{Block, INPUT_CHANNELS, Schedule, Table, block_mean, blocks};
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::lagged_command::ramp_end_s;
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;

@@ -1,13 +1,13 @@
 //! Residuals scaled by the noise and the uncertainty of the inputs.
 
 use crate::gap::model_error::structure::{repeating_part, step_errors};
-use crate::gap::residuals::machine_run::LinearisedMachine;
 use crate::gap::residuals::nuisance::{JUMP_S, NuisanceKind, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
+use crate::gap::residuals::true_inputs::LinearisedMachine;
 use mapper_core::Channel;
 use mapper_numerics::coloured_noise::{ColouredNoise, WhiteningFactor, covariance_of_means};
 use mapper_numerics::parallel;
-use mapper_observe::channels::INPUT_CHANNELS;
+use mapper_observe::averages::INPUT_CHANNELS;
 use mapper_observe::model_inputs::smoothed_inputs::InputNoise;
 use mapper_observe::perturbation::UNINFORMATIVE;
 use nalgebra::DMatrix;

@@ -8,16 +8,16 @@ use mapper_core::{
 };
 use mapper_diagnose::drift::{Cause, DriftReport, DriftRequest, RecordedRun, diagnose};
 use mapper_identify::{IdentifyConfig, WindowRule};
-use mapper_inference::time_history::TimeHistory;
+use mapper_inference::hypotheses::TimeHistory;
 use mapper_observe::declared_uncertainties;
-use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
-use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
+use mapper_physics::compressor_map::closed_form_map::{
+    CharacteristicPoint, ClosedFormMap, CompressorCharacteristic,
+};
 use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::rig::instruments::true_value;
 use mapper_physics::simulation::driven::{FrozenGrid, drive};
-use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::Model;
-use mapper_physics::simulation::steady::hold_speed;
+use mapper_physics::simulation::steady::{Inputs, hold_speed};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;

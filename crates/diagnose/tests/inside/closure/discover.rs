@@ -15,7 +15,7 @@ use crate::gap::residuals::whiten::Linearised;
 use crate::gap::{ClosureSearch, Diagnosed, GapRequest, Verdict};
 use crate::inside::gap::common::{Visits, declared, effects, request};
 use mapper_effects::ScriptEffect;
-use mapper_inference::time_history::{Shape, TimeHistory};
+use mapper_inference::hypotheses::{Shape, TimeHistory};
 use mapper_numerics::parallel;
 use mapper_observe::averages::Table;
 use mapper_physics::rig::effect::{Effect, Rig, add};

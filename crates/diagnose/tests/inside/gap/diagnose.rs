@@ -3,12 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::gap::calibrated_model::{ForecastCheck, Found};
-use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::additions::Calibration;
 use crate::gap::diagnose::{Diagnosed, gap};
-use crate::gap::findings::experiment::{AllowedJump, Experiment};
+use crate::gap::findings::experiment::{AllowedJump, Experiment, GapWarning};
 use crate::gap::findings::report::Verdict;
-use crate::gap::findings::warning::GapWarning;
-use crate::gap::next_experiment::outlook::{approximate_separation, separation};
+use crate::gap::next_experiment::{approximate_separation, separation};
 use crate::gap::preconditions::{GapError, Problem, usable};
 use crate::gap::request::RigRecording;
 use crate::gap::residuals::nuisance::NuisanceKind;

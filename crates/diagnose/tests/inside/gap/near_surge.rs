@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::best_fit::adequacy::adequacy;
-use crate::gap::best_fit::fit::{Effort, fit};
+use crate::gap::best_fit::fit::{Effort, adequacy, fit};
 use crate::gap::best_fit::normal::Selection;
-use crate::gap::causes::additions::additions;
-use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::additions::{Calibration, additions};
 use crate::gap::residuals::study::Study;
 use crate::gap::residuals::true_inputs::Actuators;
 use crate::gap::residuals::whiten::Linearised;
@@ -16,10 +14,9 @@ use mapper_observe::averages::Table;
 use mapper_observe::model_inputs::lagged_command::{LaggedCommand, Level, Response};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::true_value;
-use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::{Simulator, Watch};
-use mapper_physics::simulation::steady::hold_speed;
+use mapper_physics::simulation::steady::{Inputs, hold_speed};
 use std::collections::BTreeMap;
 
 const SPEEDS_RPM: [f64; 6] = [110e3, 50e3, 150e3, 70e3, 130e3, 90e3];

@@ -7,7 +7,7 @@ use crate::gap::findings::report::{Diagnosis, Verdict};
 use crate::gap::request::{BaselineRecording, GapRequest, RigRecording};
 use crate::inside::gap::common::{Visits, declared, effects, record_of, request};
 use mapper_core::Recording;
-use mapper_observe::channels::OUTPUTS;
+use mapper_observe::averages::OUTPUTS;
 use mapper_observe::declared::Declared;
 use mapper_physics::rig::effect::{Rig, add};
 use mapper_physics::simulation::model::Model;

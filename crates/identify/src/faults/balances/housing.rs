@@ -1,4 +1,4 @@
-//! Tc against T2: the housing's heat balance.
+//! Balances of the housing: its heat, convection, and the inlet temperature.
 //!
 //! Within a step the housing temperature changes, and T2 follows it by a share `s` that the step itself determines. By eq. 3, `T2 = s Tc + (1
 //! - s) T2ad`, so `s` is the slope of T2 over Tc, whatever the offsets. The heat flow from gas to housing is `K (T2 - Tc)` with `K = m cp s/(1
@@ -12,11 +12,16 @@
 //! uncertainty.
 
 use crate::IdentifyConfig;
-use crate::faults::balance_rows::{Rows, common, own};
+use crate::faults::balance_rows::{Machine, Rows, common, own};
+use crate::faults::balances::efficiency::{FittedEfficiencies, compressed};
 use crate::faults::end_readings::{CHANNELS, MAX_CORRELATED_ROWS, PerChannel, Readings, span_s};
+use crate::faults::nominal_rig::NominalRig;
+use crate::single_step::fit::ETA_BOUNDS;
 use crate::step_data::samples::{Row, Samples, slope_per_s};
 use mapper_core::{Channel, FaultKind, Recording, StepKind, StepMarker, Window, WindowRule};
 use mapper_numerics::statistics::{DOUBT_SIGMAS, MIN_VALUES, mean, rms};
+use mapper_physics::laws::convection;
+use nalgebra::DMatrix;
 
 /// Length of a part over which the housing's slope is taken, s. Bound: noise of 0.15 K at 10 Hz leaves 0.002 K/s, and a step of a minute
 /// has three.
@@ -194,4 +199,144 @@ fn kept_ratio(samples: &Samples, config: &IdentifyConfig) -> Option<(f64, f64)> 
     let left: f64 = rows().map(|(a, b, y)| (y - kept * a - of_rise * b).powi(2)).sum();
     let variance = samples.correlated(config)? * left / count as f64 * bb / determinant;
     (kept.is_finite() && variance.is_finite() && variance > 0.0).then(|| (kept, variance.sqrt()))
+}
+
+// Heat-transfer coefficients of the joint fit compared with the declared machine's.
+// The fit takes h from the slope of T2 over Tc, `s = 1 - exp(-n)` with `n = h A/(m cp)` transfer units. A constant error of a reading hardly
+// changes it. A gain `g` of T2 makes it `s (1 + g)`, and a probe that reads a share `x` of the way to the housing `s + x (1 - s)`: ln h rises by
+// `g s/((1 - s) n)` and by `x/n`.
+
+/// Scatter of the points about the declared law, ratio: its shape over the map. Bound: correlations that fit one rig scatter by less,
+/// 0.003 in the joint fit.
+const SHAPE_RATIO: f64 = 0.01;
+
+/// ln h itself, with the effects of errors on it. `readings`: of all steps, by position.
+pub(crate) fn measured(
+    fitted: &FittedEfficiencies,
+    readings: &[Option<Readings>],
+    config: &IdentifyConfig,
+) -> Rows {
+    let heat = &fitted.ln_h;
+    let known = fitted.known(readings);
+    let count = known.len();
+    let units = |(row, readings): &(usize, Readings)| {
+        let capacity_w_k = readings.flow_kg_s() * config.air.heat_capacity_j_kgk(readings.t2_k());
+        heat.values[*row].exp() * config.internal_area_m2 / capacity_w_k
+    };
+    let units: Vec<f64> = known.iter().map(units).collect();
+    let by_gain: Vec<f64> = units.iter().map(|units| units.exp_m1() / units).collect();
+    let by_reading = |(row, readings): &(usize, Readings)| {
+        let by_fit = &heat.by_reading[*row];
+        // At equal transfer units h is proportional to the flow.
+        let fallback = |channel| {
+            if CHANNELS[channel] == Channel::CompressorFlow { readings.flow_kg_s().recip() } else { 0.0 }
+        };
+        std::array::from_fn(|channel| by_fit[channel].unwrap_or_else(|| fallback(channel)))
+    };
+    Rows {
+        residual: known.iter().map(|(row, _)| heat.values[*row]).collect(),
+        covariance: DMatrix::from_fn(count, count, |i, j| heat.covariance[(known[i].0, known[j].0)]),
+        by_reading: known.iter().map(by_reading).collect(),
+        readings: known.iter().map(|(_, readings)| *readings).collect(),
+        by_machine: Vec::new(),
+        by_fault: vec![
+            (Channel::T2, FaultKind::TowardsWall, units.iter().map(|units| units.recip()).collect()),
+            (Channel::Tc, FaultKind::Gain, by_gain.iter().map(|gain| -gain).collect()),
+            (Channel::T2, FaultKind::Gain, by_gain),
+            (Channel::T1, FaultKind::Gain, vec![0.0; count]),
+        ],
+    }
+}
+
+/// ln h over that of the declared machine.
+pub(crate) fn convection_rows(
+    fitted: &FittedEfficiencies,
+    readings: &[Option<Readings>],
+    config: &IdentifyConfig,
+    nominal: &NominalRig<'_>,
+) -> Option<Rows> {
+    let mut rows = measured(fitted, readings, config);
+    let compressor = &nominal.model.params.compressor;
+    let known = fitted.known(readings).into_iter();
+    let etas: Vec<f64> =
+        known.map(|(row, _)| fitted.eta.values[row].clamp(ETA_BOUNDS.0, ETA_BOUNDS.1)).collect();
+    for (i, (readings, eta)) in rows.readings.iter().zip(etas).enumerate() {
+        let declared = |readings: &Readings| {
+            let h_w_m2k = convection::coefficient_w_m2k(
+                compressor.nusselt_coefficient,
+                compressor.nusselt_exponent,
+                compressor.outlet_diameter_m,
+                readings.flow_kg_s(),
+                compressed(readings, eta),
+                readings.tc_k(),
+            );
+            h_w_m2k.ln()
+        };
+        rows.residual[i] -= declared(readings);
+        let law = readings.derivatives(declared);
+        rows.by_reading[i].iter_mut().zip(law).for_each(|(own, law)| *own -= law);
+    }
+    let count = rows.residual.len();
+    (count > 0).then_some(())?;
+    rows.covariance += own(vec![SHAPE_RATIO; count].into_iter())
+        + common(&vec![1.0; count], nominal.tolerances.convection_ratio);
+    rows.by_machine = vec![(Machine::Convection, vec![1.0; count])];
+    Some(rows)
+}
+
+// T1 against Tc within a step: the inlet keeps its temperature while the housing changes its own.
+// A probe that is drawn to the housing by a share k of their distance changes by `k dTc`. Air that the housing warms before the probe does the same,
+// and T1 is then right: a recording does not tell them apart.
+
+/// Change of the inlet temperature within a step that goes with Tc by chance, one standard deviation, K. Bound: the air of a cell wanders by a
+/// few tenths of a kelvin in a minute.
+const INLET_K: f64 = 0.15;
+/// Smallest change of Tc in a step, root mean square about its mean, K. Bound: the noise of its thermocouple.
+const MIN_CHANGE_K: f64 = 0.5;
+
+/// `readings`: of all steps, by position.
+pub(crate) fn inlet_rows(
+    recording: &Recording,
+    readings: &[Option<Readings>],
+    config: &IdentifyConfig,
+) -> Option<Rows> {
+    let of_step = |(step, readings): (&StepMarker, &Option<Readings>)| {
+        let window = Window { start_s: step.start_s + WindowRule::EARLIEST_S, end_s: step.end_s };
+        let samples = Samples::of(recording, window, config, true);
+        Some((change_k(&samples, config)?, (*readings)?))
+    };
+    let found: Vec<_> = recording.steps.iter().zip(readings).filter_map(of_step).collect();
+    let count = found.len();
+    (count >= MIN_VALUES).then(|| Rows {
+        residual: found.iter().map(|(change, _)| change.t1_k).collect(),
+        covariance: own(found.iter().map(|(change, _)| change.noise_k.hypot(INLET_K))),
+        readings: found.iter().map(|(_, readings)| *readings).collect(),
+        by_reading: vec![[0.0; CHANNELS.len()]; count],
+        by_machine: Vec::new(),
+        by_fault: vec![(
+            Channel::T1,
+            FaultKind::TowardsWall,
+            found.iter().map(|(change, _)| change.tc_k).collect(),
+        )],
+    })
+}
+
+/// Changes within a step, root mean square about the mean.
+struct Change {
+    tc_k: f64,
+    /// The part of T1 that goes with Tc.
+    t1_k: f64,
+    noise_k: f64,
+}
+
+/// `None` if Tc hardly changes.
+fn change_k(samples: &Samples, config: &IdentifyConfig) -> Option<Change> {
+    let rows = || samples.rows.iter();
+    let by_tc = slope_per_s(rows().map(|row| (row.tc_k, row.t1_k)))?;
+    let middle = |of: fn(&Row) -> f64| mean(rows().map(of));
+    let (t1_k, tc_k) = (middle(|row| row.t1_k)?, middle(|row| row.tc_k)?);
+    let change_k = rms(rows().map(|row| row.tc_k - tc_k)).filter(|change_k| *change_k > MIN_CHANGE_K)?;
+    let left_k = rms(rows().map(|row| row.t1_k - t1_k - by_tc * (row.tc_k - tc_k)))?;
+    let independent = samples.len() as f64 / samples.correlated(config)?;
+    Some(Change { tc_k: change_k, t1_k: by_tc * change_k, noise_k: left_k / independent.sqrt() })
 }

@@ -1,4 +1,4 @@
-//! The expected sum of squares that the noise of smoothed inputs adds to a fit's cost, and what it adds to the apparent information.
+//! Noise of the inputs, and the whitening of residuals.
 
 use crate::joint::step_model::parameters::{
     ALPHA, EXPONENT, LN_CAPACITY, LN_COEFFICIENT, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE,
@@ -54,5 +54,28 @@ impl InputNoise {
         DMatrix::from_fn(fitted.len(), fitted.len(), |a, b| {
             place(a).zip(place(b)).map_or(0.0, |pair| self.square[pair])
         })
+    }
+}
+
+/// Cholesky factor of the covariance of a step's rows.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Whitening {
+    lower: DMatrix<f64>,
+    /// Half the ln of the determinant.
+    pub(crate) ln_spread: f64,
+}
+
+impl Whitening {
+    /// `None` if the covariance is not positive definite.
+    pub(crate) fn new(covariance: DMatrix<f64>) -> Option<Self> {
+        let lower = covariance.cholesky()?.unpack();
+        let ln_spread = lower.diagonal().iter().map(|x| x.ln()).sum();
+        Some(Whitening { lower, ln_spread })
+    }
+
+    /// Whitens columns in place.
+    pub(crate) fn apply(&self, columns: &mut DMatrix<f64>) {
+        // A Cholesky factor has no 0 on its diagonal.
+        self.lower.solve_lower_triangular_mut(columns);
     }
 }

@@ -1,16 +1,14 @@
 //! Levenberg-Marquardt on the joint fit's normal equations. Their matrix has arrow shape: a step's own parameters couple only with themselves
 //! and the shared ones, so they are eliminated step by step.
 
-use crate::joint::fit::input_noise::InputNoise;
-use crate::joint::fit::whitening::Whitening;
+use crate::joint::fit::input_noise::{InputNoise, Whitening};
 use crate::joint::step_model::history::{Prediction, Wall};
 use crate::joint::step_model::linearised::{Model, StepHistory};
 use crate::joint::step_model::parameters::{
     ETA, HOUSING, LOCAL, LocalVector, OFFSETS, Prior, SHARED, SharedVector, bounds, longest_move,
 };
 use mapper_core::IdentifiedInlet;
-use mapper_numerics::least_squares::descent::ENOUGH;
-use mapper_numerics::least_squares::{Arrow, ArrowBlock, DampedFit, Reduced, inverse, minimise};
+use mapper_numerics::least_squares::{Arrow, ArrowBlock, DampedFit, ENOUGH, Reduced, inverse, minimise};
 use mapper_numerics::parallel;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Matrix4xX, Vector4};
 

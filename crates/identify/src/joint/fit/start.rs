@@ -1,26 +1,25 @@
 //! Prepares a recording for the fit, and estimates noise and spreads from the fit.
 
-use crate::faults::smooth::ANY_ROUGHNESS;
+use crate::faults::end_readings::ANY_ROUGHNESS;
 use crate::joint::fit::input_noise::InputNoise;
 use crate::joint::fit::solve::{Member, Problem};
-use crate::joint::fit::{inlet, step_noise};
+use crate::joint::fit::{refinements, step_noise};
 use crate::joint::step_model::gas_path::{Setting, reynolds};
 use crate::joint::step_model::linearised::{Model, StepHistory};
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, BEARING, ETA, EXPONENT, EXTERNAL, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HEAT,
     HEAT_BY_TC, HUMIDITY, INLET, LN_AREA, LN_CAPACITY, LN_COEFFICIENT, LN_DEVIATION,
     LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LN_OIL, LOCAL, LOGIT_INNER, OFFSET_CHANNELS, OFFSETS,
-    PREHEAT, PROBE_MM2, Prior, RADIATION, REFINEMENTS, SHARED, STEP_HEAT, SURFACE, TC_LAG, THERMOMETERS,
+    PREHEAT, PROBE_MM2, Prior, RADIATION, REFINEMENTS, SHARED, STEP_HEAT, SURFACE, SurfaceScale, TC_LAG,
+    TERM_COUNT, THERMOMETERS,
 };
 use crate::joint::step_model::rows::{StepRows, condensed};
-use crate::joint::step_model::surface::{SurfaceScale, TERM_COUNT};
 use crate::single_step::dynamic::{self, Estimate};
-use crate::step_data::cleaning::cleaned;
 use crate::step_data::end_state::EndState;
-use crate::step_data::samples::Samples;
-use crate::step_data::window;
+use crate::step_data::samples::{Samples, cleaned};
+use crate::step_data::{end_state, samples};
 use crate::step_outcome::findings::Findings;
-use crate::{IdentifyConfig, WindowRule, step_data::commands};
+use crate::{IdentifyConfig, WindowRule};
 use mapper_core::unit_factors::MM_PER_M;
 use mapper_core::{Channel, Choice, Recording, Series, StepMarker, TooFew, Warning, Window};
 use mapper_numerics::parallel;
@@ -150,7 +149,7 @@ fn rows_of(
 ) -> Option<StepRows> {
     let step = recording.steps.get(position)?;
     let after_s = start_after_s(config);
-    let start_s = commands::settled_s(recording, step).max(step.start_s) + after_s;
+    let start_s = samples::settled_s(recording, step).max(step.start_s) + after_s;
     if start_s.is_nan() || start_s >= step.end_s {
         let late = TooFew::LateCommands { before_end_s: step.end_s - start_s };
         own.refuse(Warning::TooFewSamples(late));
@@ -166,8 +165,8 @@ fn rows_of(
     if !config.declared.is_empty() {
         // The fit follows changes within the step, but the point is the settled end of the step.
         let needed_s = WindowRule::settled_end_s(step.end_s - step.start_s);
-        if let Some(window::Settling { slowest, settled_s, whole: false, .. }) =
-            window::settling(recording, step, &config.settle_bands)
+        if let Some(end_state::Settling { slowest, settled_s, whole: false, .. }) =
+            end_state::settling(recording, step, &config.settle_bands)
             && settled_s < needed_s.floor()
         {
             let quantity = slowest.to_owned();
@@ -245,7 +244,7 @@ pub(crate) fn problem<'a>(
     priors[PROBE_MM2].mean = probe_mm2;
     active[PROBE_MM2] = choice.probe == Choice::Fitted;
     active[LN_HEATING_COOLING_RATIO] = choice.heating_cooling_ratio == Choice::Fitted;
-    shared[INLET] = inlet::power_of(config.inlet_convection);
+    shared[INLET] = refinements::power_of(config.inlet_convection);
     priors[LN_AREA] = Prior { mean: 0.0, sigma: config.internal_area_sigma_ratio };
     active[LN_AREA] = config.internal_area_sigma_ratio > 0.0;
     if choice.offsets == Choice::Fitted {

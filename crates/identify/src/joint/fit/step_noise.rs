@@ -5,13 +5,11 @@
 //! smoothing and model; the error of the surface's slope; and an unknown Tc at the first row.
 
 use crate::IdentifyConfig;
-use crate::joint::fit::input_noise::{BY_INPUT_NOISE, InputNoise};
+use crate::joint::fit::input_noise::{BY_INPUT_NOISE, InputNoise, Whitening};
 use crate::joint::fit::solve::{Member, Problem};
-use crate::joint::fit::whitening::Whitening;
 use crate::joint::step_model::linearised::{Linearised, SmoothedInput, StepHistory};
 use crate::joint::step_model::parameters::{ETA, LOCAL, SHARED, SharedVector};
-use crate::joint::step_model::rows::StepRows;
-use crate::joint::step_model::smoothing::{Basis, FLOW, P1, P2, SMOOTHED_COUNT, Smoothing, T1, TC};
+use crate::joint::step_model::rows::{Basis, FLOW, P1, P2, SMOOTHED_COUNT, Smoothing, StepRows, T1, TC};
 use mapper_core::Channel;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::rms;

@@ -18,10 +18,9 @@ use crate::joint::step_model::linearised::{
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, ETA, FIRST_READING, FLOW_GAIN, GAINS, HUMIDITY, INLET, LN_CAPACITY, LN_DEVIATION,
     LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOCAL, LOGIT_INNER, LocalVector, OFFSETS, PREHEAT,
-    PROBE_MM2, SHARED, STEP_HEAT, SharedVector, TC_LAG, THERMOMETERS,
+    PROBE_MM2, SHARED, STEP_HEAT, SharedVector, TC_LAG, TERM_COUNT, THERMOMETERS, dot,
 };
 use crate::joint::step_model::rows::{MAX_ROW_GAP_S, Row};
-use crate::joint::step_model::surface::{TERM_COUNT, dot};
 use mapper_physics::rig::sensor_fault::ExactReadings;
 
 /// Exponent below which the mean over a row replaces the formula. Bound: the next term is below rounding.

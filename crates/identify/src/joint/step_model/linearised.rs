@@ -1,17 +1,17 @@
 //! A step's model linearised: one column per parameter, by the chain rule from the inputs of a row through wall, probe and integral.
 
 use crate::config::Housing;
-use crate::joint::step_model::gas_path::{GasPath, INPUT_COUNT, Input, Inputs, Setting, Slopes};
-use crate::joint::step_model::housing::HEAT_PARAMETERS;
+use crate::joint::step_model::gas_path::{
+    GasPath, HEAT_PARAMETERS, INPUT_COUNT, Input, Inputs, Setting, Slopes,
+};
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAINS, HUMIDITY, INLET, LN_CAPACITY,
     LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, LocalVector,
     OFFSETS, P1_GAIN, P1_OFFSET, P2_GAIN, P2_OFFSET, PREHEAT, PROBE_MM2, STEP_HEAT, SURFACE, SharedVector,
-    T2_GAIN, T2_OFFSET, TC_GAIN, TC_LAG, TC_OFFSET, THERMOMETERS,
+    T2_GAIN, T2_OFFSET, TC_GAIN, TC_LAG, TC_OFFSET, TERM_COUNT, THERMOMETERS, dot,
 };
 use crate::joint::step_model::rows::{Row, StepRows};
-use crate::joint::step_model::surface::{TERM_COUNT, dot};
-use crate::single_step::probe::{self, Lag, follow};
+use crate::single_step::fit::{self, Lag, follow};
 use mapper_core::unit_factors::M_PER_MM;
 use mapper_physics::rig::sensor_fault::ExactReadings;
 
@@ -139,7 +139,7 @@ impl Model {
         let share = (square_mm2 / LINEAR_BELOW_MM2).clamp(-1.0, 1.0);
         let diameter_m = M_PER_MM * square_mm2.abs().max(LINEAR_BELOW_MM2).sqrt();
         let rows = rows.iter().zip(gas_k).map(|(row, gas_k)| (row.t_s, row.flow_kg_s, *gas_k));
-        Probe { lags: probe::lags(rows, diameter_m, self.setting.outlet_diameter_m), share }
+        Probe { lags: fit::lags(rows, diameter_m, self.setting.outlet_diameter_m), share }
     }
 }
 
@@ -212,7 +212,7 @@ impl Linearised<'_> {
         (column, wall_k.unwrap_or(0.0))
     }
 
-    /// Change of the readings by a function along the window of a channel of [`Smoothing`](super::smoothing::Smoothing).
+    /// Change of the readings by a function along the window of a channel of [`Smoothing`](crate::joint::step_model::rows::Smoothing).
     pub(crate) fn by_input(
         &self,
         history: &StepHistory<'_>,
@@ -407,7 +407,7 @@ mod tests {
     use super::*;
     use crate::IdentifyConfig;
     use crate::joint::step_model::parameters::{LOCAL, SHARED};
-    use crate::joint::step_model::smoothing::Smoothing;
+    use crate::joint::step_model::rows::Smoothing;
     use nalgebra::DMatrix;
 
     fn model(has_inner_wall: bool) -> Model {

@@ -2,9 +2,6 @@
 
 pub(crate) mod gas_path;
 pub(crate) mod history;
-pub(crate) mod housing;
 pub(crate) mod linearised;
 pub(crate) mod parameters;
 pub(crate) mod rows;
-pub(crate) mod smoothing;
-pub(crate) mod surface;

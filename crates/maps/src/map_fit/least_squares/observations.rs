@@ -5,7 +5,7 @@
 
 use crate::map_fit::MapFitError;
 use mapper_core::{CommonErrors, CompressorMap, MapPoint, SurgeMark, Verdict};
-use mapper_physics::compressor_map::characteristic::head_ratio;
+use mapper_physics::compressor_map::closed_form_map::head_ratio;
 
 /// Maximum pressure ratio of a point. Bound: several stages; a larger one is a mistake.
 const MAX_PRESSURE_RATIO: f64 = 50.0;

@@ -5,11 +5,10 @@
 
 use crate::map_fit::MapFitError;
 use crate::map_fit::least_squares::observations::{Observation, Observations};
-use crate::map_fit::speed_lines::line_shape::{
+use crate::map_fit::speed_lines::{
     CHOKE_FLOW, CHOKE_HEAD, EXPONENTS, FlowFrame, Foot, LineShape, MIN_SQUARE_SLOPE, PARAMETERS, Parameters,
-    Scales, WORK, ZERO_SLOPE_FLOW, ZERO_SLOPE_HEAD, nearest, normal,
+    Rows, Scales, Splines, WORK, ZERO_SLOPE_FLOW, ZERO_SLOPE_HEAD, nearest, normal,
 };
-use crate::map_fit::speed_lines::speed_spline::{Rows, Splines};
 use mapper_numerics::statistics::{mean, median, quantile};
 use nalgebra::{DMatrix, DVector};
 

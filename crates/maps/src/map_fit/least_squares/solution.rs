@@ -10,8 +10,9 @@ use crate::map_fit::least_squares::observations::Observations;
 use crate::map_fit::least_squares::problem::{
     LINE_OFFSETS, Precisions, Problem, ROBUST_SIGMAS, ROUGHNESS_PRECISION_RANGE, Unknowns,
 };
-use crate::map_fit::speed_lines::line_shape::{FlowFrame, LineShape, PARAMETERS, Parameters, WORK};
-use crate::map_fit::speed_lines::speed_spline::{End, EndWidenings, NO_WIDENING, Splines, Widening};
+use crate::map_fit::speed_lines::{
+    End, EndWidenings, FlowFrame, LineShape, NO_WIDENING, PARAMETERS, Parameters, Splines, WORK, Widening,
+};
 use mapper_numerics::least_squares::{Damping, DampingRule, damped_step, inverse};
 use mapper_numerics::statistics::{NORMAL_975, SHARE_975, student_quantile};
 use nalgebra::{DMatrix, DVector};

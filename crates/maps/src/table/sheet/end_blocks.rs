@@ -1,7 +1,7 @@
 //! Blocks of a table that are no speed lines: the surge line below its title, and the line of choke.
 
 use crate::table::column::Column;
-use crate::table::described_columns::DescribedColumns;
+use crate::table::description::DescribedColumns;
 use crate::table::quantity::{Quantity, end_in, end_of_title, is_end_title};
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::layout::{self, Layout, columns};

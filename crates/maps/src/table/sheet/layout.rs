@@ -1,7 +1,7 @@
 //! Detects the layout of a table: its headings, and whether speed lines are below each other or side by side.
 
 use crate::table::column::{Column, ColumnError, Machine, column, with_machine_letters};
-use crate::table::described_columns::DescribedColumns;
+use crate::table::description::DescribedColumns;
 use crate::table::quantity::{Quantity, is_end_title};
 use crate::table::sheet::grid::{Grid, GridRow};
 use crate::table::sheet::headings::{Headings, speed_in, without_speed};

@@ -4,6 +4,5 @@ pub(crate) mod end_blocks;
 pub(crate) mod grid;
 pub(crate) mod headings;
 pub(crate) mod layout;
-pub(crate) mod matrices;
 pub(crate) mod points;
 pub(crate) mod workbook;

@@ -3,7 +3,7 @@
 use crate::table::quantity::end_in;
 use crate::table::sheet::grid::{Grid, GridRow, MAX_ROWS, count_number_cells, text_of};
 use crate::table::sheet::headings::without_speed;
-use crate::table::sheet::matrices::{points_of_matrices, quantity_of_title};
+use crate::table::sheet::points::{points_of_matrices, quantity_of_title};
 use mapper_core::{ImportError, MAP_FILE_SIZE_LIMIT};
 use mapper_table::{Book, Value, XlsxLimits, decimal_sign_of_cells, is_workbook, parse_number};
 use std::borrow::Cow;

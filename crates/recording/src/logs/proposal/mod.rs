@@ -3,11 +3,11 @@
 mod channel_proposal;
 mod physics;
 mod propose;
-mod remark;
 mod shared_units;
 mod tag_stations;
 
-pub use channel_proposal::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel, channel_map_text};
+pub(crate) use channel_proposal::short;
+pub use channel_proposal::{
+    Ambient, Certainty, NominalFlows, Proposal, ProposalRemark, ProposedChannel, channel_map_text,
+};
 pub use propose::propose;
-pub use remark::ProposalRemark;
-pub(crate) use remark::short;

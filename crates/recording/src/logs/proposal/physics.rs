@@ -1,8 +1,8 @@
 //! Checks the proposed channels against each other: a compressor raises pressure and temperature, and flow increases with speed.
 
 use super::channel_proposal::{Ambient, Certainty, Proposal, ProposedChannel};
-use super::remark::ProposalRemark as Remark;
-use crate::logs::plausible::STANDARD_ATMOSPHERE_PA;
+use crate::logs::finding::STANDARD_ATMOSPHERE_PA;
+use crate::logs::proposal::channel_proposal::ProposalRemark as Remark;
 use crate::logs::{Layout, Survey};
 use mapper_core::Channel;
 use mapper_table::{ColumnName, Word, kind_of, unit};

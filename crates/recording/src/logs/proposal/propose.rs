@@ -1,10 +1,10 @@
 //! Assigns the columns of a log to channels.
 
 use super::channel_proposal::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel};
-use super::remark::ProposalRemark as Remark;
 use super::tag_stations::{MIN_CLEAR_WEIGHT, Weight, channels_of};
 use super::{physics, shared_units, tag_stations};
-use crate::logs::plausible::{AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, looks_like_gauge};
+use crate::logs::finding::{AMBIENT_RANGE_PA, TRIMMED_SHARE, fitting_units, looks_like_gauge};
+use crate::logs::proposal::channel_proposal::ProposalRemark as Remark;
 use crate::logs::{Column, ColumnSurvey, Layout, Survey};
 use mapper_core::{CHANNELS, Channel, is_plausible_range, plausible};
 use mapper_table::{

@@ -2,8 +2,8 @@
 
 use super::channel_proposal::{Certainty, NominalFlows, Proposal, ProposedChannel};
 use super::physics::EXPONENT;
-use super::remark::ProposalRemark as Remark;
-use crate::logs::plausible::{STANDARD_ATMOSPHERE_PA, TRIMMED_SHARE, fitting_units};
+use crate::logs::finding::{STANDARD_ATMOSPHERE_PA, TRIMMED_SHARE, fitting_units};
+use crate::logs::proposal::channel_proposal::ProposalRemark as Remark;
 use crate::logs::{Layout, Survey};
 use mapper_core::Channel;
 use mapper_core::unit_factors::S_PER_MIN;

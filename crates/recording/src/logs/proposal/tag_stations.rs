@@ -1,10 +1,11 @@
 //! Channels that the name of a column may mean, and stations of tag numbers: a temperature and a pressure with one loop number, where only one
 //! order of the loops is a compressor.
 
-use crate::logs::plausible::STANDARD_ATMOSPHERE_PA;
-use crate::logs::proposal::channel_proposal::{Certainty, Proposal, ProposedChannel};
+use crate::logs::finding::STANDARD_ATMOSPHERE_PA;
+use crate::logs::proposal::channel_proposal::{
+    Certainty, Proposal, ProposalRemark as Remark, ProposedChannel,
+};
 use crate::logs::proposal::physics::EXPONENT;
-use crate::logs::proposal::remark::ProposalRemark as Remark;
 use crate::logs::{Layout, Survey};
 use mapper_core::{CHANNELS, Channel};
 use mapper_table::{Clarity, ColumnName, HeaderUnit, Measured, Place, Reference, Word, channel_at};

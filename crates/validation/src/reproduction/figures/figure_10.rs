@@ -1,8 +1,7 @@
 //! Figure 10: heat from the turbine, varied by the oil's cooling.
 
-use crate::reproduction::figure_data::{fixed, range};
 use crate::reproduction::lab::{
-    JUMPS, Outcome, RUN_S, Run, dynamic_config, extremes, identify_runs, rms, run_all, worst,
+    JUMPS, Outcome, RUN_S, Run, dynamic_config, extremes, fixed, identify_runs, range, rms, run_all, worst,
 };
 use crate::reproduction::picture::{
     efficiency_pair, efficiency_panel, h_pair, h_panel, series_by_case, span_at_speed,

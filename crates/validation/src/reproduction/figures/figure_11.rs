@@ -1,8 +1,8 @@
 //! Figure 11 (b): the heat-transfer coefficient when the gas heats the housing and when the housing heats the gas.
 
-use crate::reproduction::figure_data::{fixed, range};
 use crate::reproduction::lab::{
-    Outcome, RUN_S, Run, WINDOW, dynamic_config, extremes, identify_run, run_all, truth_in_window,
+    Outcome, RUN_S, Run, WINDOW, dynamic_config, extremes, fixed, identify_run, range, run_all,
+    truth_in_window,
 };
 use crate::reproduction::picture::{h_pair, h_panel};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};

@@ -1,8 +1,7 @@
 //! Figure 12: error against the size of the transient, with the noise and the offsets of a rig.
 
-use crate::reproduction::figure_data::fixed;
 use crate::reproduction::lab::{
-    Jump, Outcome, RUN_S, Run, dynamic_config, identify_recording, rms, run_lagged,
+    Jump, Outcome, RUN_S, Run, dynamic_config, fixed, identify_recording, rms, run_lagged,
 };
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Figure, Marker, Panel, Rule, RuleAt, Scatter, palette};

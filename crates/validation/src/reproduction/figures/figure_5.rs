@@ -1,7 +1,6 @@
 //! Figure 5: conventional mapping; apparent efficiency of settled points at several turbine inlet temperatures.
 
-use crate::reproduction::figure_data::{fixed, range, signed_or_dash};
-use crate::reproduction::lab::{extremes, worst};
+use crate::reproduction::lab::{extremes, fixed, range, signed_or_dash, worst};
 use crate::reproduction::picture::{krpm, speed_colour, target_speeds_rpm};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Scatter};

@@ -1,9 +1,9 @@
 //! Figure 6: the dynamic method against the model's own efficiency and heat-transfer coefficient.
 
-use crate::reproduction::figure_data::{fixed, range, signed, signed_or_dash};
 use crate::reproduction::figures::figure_5::apparent_eta;
 use crate::reproduction::lab::{
-    Outcome, Run, WINDOW, dynamic_config, extremes, identify_runs, rms, truth_in_window, worst,
+    Outcome, Run, WINDOW, dynamic_config, extremes, fixed, identify_runs, range, rms, signed, signed_or_dash,
+    truth_in_window, worst,
 };
 use crate::reproduction::picture::{
     efficiency_pair, efficiency_panel, h_pair, h_panel, series_by_speed, speed_colour, target_speeds_rpm,

@@ -1,7 +1,6 @@
 //! Figure 7: duration and start of the window.
 
-use crate::reproduction::figure_data::fixed;
-use crate::reproduction::lab::{Outcome, Run, identify_runs, rms, worst};
+use crate::reproduction::lab::{Outcome, Run, fixed, identify_runs, rms, worst};
 use crate::reproduction::picture::{at_speed, krpm, speed_colour, target_speeds_rpm};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Rule, RuleAt, palette};

@@ -1,8 +1,7 @@
 //! Figure 8: error due to a wrong share of the internal area before compression (alpha_A).
 
-use crate::reproduction::figure_data::{fixed, range};
 use crate::reproduction::lab::{
-    JUMPS, Outcome, RUN_S, dynamic_config, extremes, identify_runs, rms, run_all, worst,
+    JUMPS, Outcome, RUN_S, dynamic_config, extremes, fixed, identify_runs, range, rms, run_all, worst,
 };
 use crate::reproduction::picture::{
     at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, series_by_speed, span_at_speed,

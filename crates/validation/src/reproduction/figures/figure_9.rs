@@ -1,8 +1,8 @@
 //! Figure 9: thermocouples of several diameters at the compressor outlet.
 
-use crate::reproduction::figure_data::{fixed, range};
 use crate::reproduction::lab::{
-    JUMPS, Outcome, RUN_S, WINDOW, dynamic_config, extremes, identify_runs, run_all, truth_in_window, worst,
+    JUMPS, Outcome, RUN_S, WINDOW, dynamic_config, extremes, fixed, identify_runs, range, run_all,
+    truth_in_window, worst,
 };
 use crate::reproduction::picture::{
     at_speed, efficiency_pair, efficiency_panel, h_pair, h_panel, krpm, series_by_case, span_at_speed,

@@ -2,6 +2,5 @@
 
 pub(crate) mod actuator;
 pub(crate) mod drift;
-pub(crate) mod precursor;
 pub(crate) mod running;
 pub(crate) mod tolerances;

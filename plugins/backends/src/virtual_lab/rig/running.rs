@@ -1,16 +1,17 @@
-//! The running machine: the lumped model, or other equations in the same rig; its boundary conditions, from the test cell and from the actuators
-//! that follow the commands.
+//! The running rig of the virtual lab, with the precursors of surge.
 
-use crate::virtual_lab::name::NAME;
 use crate::virtual_lab::rig::actuator::{Actuator, ActuatorDynamics};
 use crate::virtual_lab::rig::drift::Weather;
+use crate::virtual_lab::setting_problem::NAME;
+use mapper_physics::gas::air;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
-use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::simulation::steady::Inputs;
 use mapper_physics::simulation::model::{Model, Outputs, State};
-use mapper_physics::simulation::simulate::{
-    DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Simulator, Watch,
-};
+use mapper_physics::simulation::simulate::{DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Simulator, Watch};
 use mapper_physics::simulation::steady;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
 
 /// Failure to find a steady state.
 pub type StructureError = Box<dyn std::error::Error + Send + Sync>;
@@ -172,5 +173,155 @@ impl Inputs for LabInputs {
 
     fn is_constant_after(&self, t_s: f64) -> bool {
         self.weather.is_calm() && self.actuators().iter().all(|actuator| actuator.has_arrived(t_s))
+    }
+}
+
+// Fluctuations of flow and pressures before surge: they grow as the operating point approaches the surge line.
+// Compressor, outlet duct and volume are a Helmholtz resonator whose damping is the slope of the speed line (E. M. Greitzer,
+// "Surge and rotating stall in axial flow compressors, part I", J. Eng. Power 98 (1976) 190-198). Near the zero-slope point
+// that slope goes to zero in proportion to the distance in flow, and a resonator that turbulence excites has a variance in
+// inverse proportion to its damping. Sampled at some 10 Hz, this appears as aliased noise of growing size. Such growth
+// before surge was measured on turbochargers, e.g. by J. Galindo et al., Exp. Thermal Fluid Sci. 30 (2006) 449-462.
+
+/// Growth of the fluctuation; a size of 0 means none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurgePrecursor {
+    /// Surge margin (flow over surge flow, minus one) at which flow and pressures begin to fluctuate, ratio, > 0.
+    pub onset_margin_ratio: f64,
+    /// Root mean square of the flow fluctuation at half that margin, ratio of the flow.
+    pub size_ratio: f64,
+    /// Exponent of the growth: the variance is proportional to the `-growth`th power of the margin; 1 by theory.
+    pub growth: f64,
+}
+
+impl SurgePrecursor {
+    /// No precursor.
+    pub const NONE: SurgePrecursor =
+        SurgePrecursor { onset_margin_ratio: 0.25, size_ratio: 0.0, growth: 1.0 };
+    /// The default of a campaign.
+    pub const USUAL: SurgePrecursor = SurgePrecursor { size_ratio: 3e-3, ..SurgePrecursor::NONE };
+
+    /// Root mean square of the flow fluctuation, ratio: at most `max_rms_ratio`, at which the fluctuation saturates.
+    fn rms_ratio(&self, margin_ratio: f64, max_rms_ratio: f64) -> f64 {
+        if margin_ratio >= self.onset_margin_ratio {
+            return 0.0;
+        }
+        // The fluctuation at the onset is part of the sensors' noise.
+        let growth = |margin_ratio: f64| (self.onset_margin_ratio / margin_ratio).powf(self.growth) - 1.0;
+        let variance = growth(margin_ratio.max(1e-4)) / growth(0.5 * self.onset_margin_ratio);
+        (self.size_ratio * variance.max(0.0).sqrt()).min(max_rms_ratio)
+    }
+}
+
+/// Length of the outlet duct between wheel and volume, m: that of a gas stand.
+const DUCT_LENGTH_M: f64 = 0.5;
+/// Damping ratio of the resonator at the onset: slope of the speed line and of the valve's resistance, over twice
+/// the resonator's impedance.
+const DAMPING_AT_ONSET_RATIO: f64 = 0.13;
+
+/// Frequency of the Helmholtz resonator of outlet duct and volume, rad/s.
+fn helmholtz_rad_s(params: &Params, gas_k: f64) -> f64 {
+    let area_m2 = 0.25 * std::f64::consts::PI * params.compressor.outlet_diameter_m.powi(2);
+    let sound_m_s = (air::HEAT_CAPACITY_RATIO * air::GAS_CONSTANT_J_KGK * gas_k).sqrt();
+    sound_m_s * (area_m2 / (DUCT_LENGTH_M * params.outlet.volume_m3)).sqrt()
+}
+
+/// Relative fluctuations of the readings at one instant.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Swing {
+    /// Fluctuation of the compressor's flow.
+    pub(crate) flow_ratio: f64,
+    /// Fluctuation of P2: smaller than that of the flow, because the volume damps it.
+    pub(crate) p2_ratio: f64,
+    /// Fluctuation of P1.
+    pub(crate) p1_ratio: f64,
+}
+
+/// Swing of P2 over that of the flow.
+pub(crate) const P2_SHARE: f64 = 0.2;
+/// Swing of P1 over that of the flow: the inlet duct is open.
+const P1_SHARE: f64 = 0.01;
+
+/// The resonator, with its own random numbers, so that readings away from surge do not depend on it.
+#[derive(Debug)]
+pub(crate) struct Resonator {
+    settings: SurgePrecursor,
+    random: Pcg64,
+    /// Flow and pressure, each of unit variance.
+    swing: [f64; 2],
+}
+
+impl Resonator {
+    pub(crate) fn new(settings: SurgePrecursor, seed: u64) -> Self {
+        let mut random =
+            Pcg64::seed_from_u64(seed.wrapping_mul(0x8CB9_2BA7_2F3D_8DD7) ^ 0x2545_F491_4F6C_DD1D);
+        let swing = [StandardNormal.sample(&mut random), StandardNormal.sample(&mut random)];
+        Resonator { settings, random, swing }
+    }
+
+    /// The swing at the next sample; `margin_ratio` is the surge margin.
+    pub(crate) fn next(
+        &mut self,
+        margin_ratio: f64,
+        sample_s: f64,
+        params: &Params,
+        gas_k: f64,
+        max_rms_ratio: f64,
+    ) -> Swing {
+        let rms_ratio = self.settings.rms_ratio(margin_ratio, max_rms_ratio);
+        if rms_ratio <= 0.0 {
+            return Swing::default();
+        }
+        let angular_rad_s = helmholtz_rad_s(params, gas_k);
+        let damping_ratio =
+            DAMPING_AT_ONSET_RATIO * (margin_ratio / self.settings.onset_margin_ratio).max(1e-3);
+        let memory_ratio = (-damping_ratio * angular_rad_s * sample_s).exp();
+        let innovation_ratio = (1.0 - memory_ratio * memory_ratio).sqrt();
+        let (sin, cos) = (angular_rad_s * sample_s).sin_cos();
+        let kicks: [f64; 2] =
+            [StandardNormal.sample(&mut self.random), StandardNormal.sample(&mut self.random)];
+        let [flow, pressure] = self.swing;
+        self.swing = [
+            memory_ratio * (cos * flow - sin * pressure) + innovation_ratio * kicks[0],
+            memory_ratio * (sin * flow + cos * pressure) + innovation_ratio * kicks[1],
+        ];
+        let [flow, pressure] = self.swing.map(|swing| rms_ratio * swing);
+        Swing { flow_ratio: flow, p2_ratio: P2_SHARE * pressure, p1_ratio: -P1_SHARE * flow }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Root mean square of flow and P2 over many samples at one margin.
+    fn rms(margin_ratio: f64) -> [f64; 2] {
+        let mut resonator = Resonator::new(SurgePrecursor::USUAL, 3);
+        let mut sums = [0.0; 2];
+        for _ in 0..40_000 {
+            let swing = resonator.next(margin_ratio, 0.1, &Params::default(), 350.0, 0.04);
+            sums[0] += swing.flow_ratio.powi(2);
+            sums[1] += swing.p2_ratio.powi(2);
+        }
+        sums.map(|sum: f64| (sum / 40_000.0).sqrt())
+    }
+
+    #[test]
+    fn the_variance_grows_as_the_damping_falls_and_none_is_beyond_the_onset() {
+        assert_eq!(rms(0.25), [0.0, 0.0]);
+        // 40 000 samples, at 2 % of margin some 20 000 independent ones: the root mean square is accurate to 0.5 %.
+        for (margin_ratio, expected) in [(0.125, 3e-3), (0.05, 6e-3), (0.025, 9e-3)] {
+            let [flow, p2] = rms(margin_ratio);
+            assert!((flow / expected - 1.0).abs() < 0.03, "{margin_ratio}: {flow} {expected}");
+            assert!((p2 / (P2_SHARE * expected) - 1.0).abs() < 0.03, "{margin_ratio}: {p2}");
+        }
+        assert!(rms(0.0)[0] < 0.045, "it limits itself");
+    }
+
+    #[test]
+    fn the_resonator_has_the_frequency_of_duct_and_volume() {
+        // Speed of sound 375 m/s at 350 K, 9.62 cm2 of duct, 0.5 m, 0.78 l: 375/(2 pi) sqrt(9.62e-4/3.9e-4) = 93.7 Hz.
+        let hz = helmholtz_rad_s(&Params::default(), 350.0) / (2.0 * std::f64::consts::PI);
+        assert!((hz / 93.7 - 1.0).abs() < 0.01, "{hz}");
     }
 }

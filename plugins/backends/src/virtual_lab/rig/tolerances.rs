@@ -1,7 +1,7 @@
 //! Normal deviations of a fault-free machine: parameters and a map within declared tolerances.
 
 use mapper_core::{ModelTolerances, ReferenceState};
-use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+use mapper_physics::compressor_map::closed_form_map::{CharacteristicPoint, CompressorCharacteristic};
 use mapper_physics::rig::effect::Rig;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};

@@ -1,7 +1,7 @@
 //! Recordings of the adaptive simulator. It shares the equations with the driven model, but not its grid, inputs or noise.
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::additions::Calibration;
 use crate::gap::request::{ClosureSearch, GapRequest, RigRecording};
 use mapper_core::{
     Channel, DeclaredUncertainty, ModelTolerances, NoiseColour, Recording, Series, StepKind, StepMarker,
@@ -10,10 +10,9 @@ use mapper_observe::declared::{Declared, declared_uncertainties};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::effect::{Effect, Rig};
 use mapper_physics::rig::instruments::ChannelFollower;
-use mapper_physics::simulation::inputs::InterpolatedInputs;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::{Simulator, Watch};
-use mapper_physics::simulation::steady::hold_speed;
+use mapper_physics::simulation::steady::{InterpolatedInputs, hold_speed};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
@@ -123,7 +122,7 @@ fn recorded(
     let sample = |t_s: f64,
                   state: &mapper_physics::simulation::model::State,
                   outputs: &mapper_physics::simulation::model::Outputs| {
-        let at = mapper_physics::simulation::inputs::Inputs::at(&inputs, t_s);
+        let at = mapper_physics::simulation::steady::Inputs::at(&inputs, t_s);
         let prepared = rig.model.prepare(&at);
         for (i, (channel, noise, _)) in SENSORS.iter().enumerate() {
             let seen = followers[i]

@@ -26,7 +26,7 @@ const FORMULAS: &[(&str, &[f64], &str)] = &[
         &[0.25, 3.0],
         "cubic with given slopes; integrated noise; window of a spline",
     ),
-    ("crates/maps/src/map_fit/least_squares/solution.rs", &[3.0], "variance of a uniform share"),
+    ("crates/maps/src/map_fit/solution.rs", &[3.0], "variance of a uniform share"),
     ("crates/maps/src/map_fit/speed_lines.rs", &[3.0, 6.0], "natural cubic spline"),
 ];
 

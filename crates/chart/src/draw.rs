@@ -1,13 +1,13 @@
 //! Draws a figure: arrow heads, items, panels.
 
 use crate::contours::{self, Rect, band, contour_lines, place, without_gap};
-use crate::drawing::{Drawing, Stroke, TextAnchor, TextStyle};
 use crate::frame::Frame;
 use crate::items::{Annotation, Item, Line, LineEnd, Rule, RuleAt, Scatter};
 use crate::layout::{
     AXIS_TITLE_PX, MARGIN_PX, PANEL_TITLE_PX, PlacedPanel, SUBTITLE_PX, Surroundings, TICK_PX, TITLE_PX,
     draw_legend, draw_marker, layout,
 };
+use crate::map_drawing::{Drawing, Stroke, TextAnchor, TextStyle};
 use crate::palette::{BLUE, Colour, GREY, INK, LIGHT_GREY};
 use crate::text::{cut, width_px};
 use crate::{Contours, Figure, Panel};

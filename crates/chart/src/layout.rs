@@ -1,9 +1,9 @@
 //! Layout of a figure, and the places of its labels.
 
 use crate::contours::{Rect, touches};
-use crate::drawing::{Drawing, Stroke, TextAnchor, TextStyle};
 use crate::frame::{Frame, fit_scales};
 use crate::items::{Marker, Scatter};
+use crate::map_drawing::{Drawing, Stroke, TextAnchor, TextStyle};
 use crate::palette::{GREY, INK, WHITE};
 use crate::text::{cut, width_px, wrap};
 use crate::{Colour, Figure, Item, Panel};

@@ -22,7 +22,6 @@
 
 mod contours;
 mod draw;
-mod drawing;
 pub mod efficiency_mesh;
 mod figure;
 mod frame;

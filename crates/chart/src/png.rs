@@ -4,7 +4,7 @@
 //! Letters are placed from left to right with the kerning of the font, which is sufficient for titles, units and numbers. Joined or
 //! right-to-left scripts are correct only in the SVG, because the viewer sets its text.
 
-use crate::drawing::{Drawing, Px, Shape, Stroke, TextAnchor, TextStyle};
+use crate::map_drawing::{Drawing, Px, Shape, Stroke, TextAnchor, TextStyle};
 use crate::palette::WHITE;
 use crate::{Colour, Figure};
 use tiny_skia::{Color, FillRule, LineJoin, Paint, Path, PathBuilder, Pixmap, StrokeDash, Transform};
@@ -30,9 +30,6 @@ pub enum PngError {
 
 impl Figure {
     /// Renders a PNG file with `scale` pixels for each unit of the SVG (above 0; 2 is sharp on paper).
-    ///
-    /// # Errors
-    /// [`PngError`].
     pub fn to_png(&self, scale: f32) -> Result<Vec<u8>, PngError> {
         let pixels = render(&crate::draw::draw_figure(self), scale)?;
         pixels.encode_png().map_err(|error| PngError::Encode(Box::new(error)))

@@ -1,6 +1,6 @@
 //! A drawing as SVG, with fixed number formatting.
 
-use crate::drawing::{Drawing, Px, Shape, Stroke, TextAnchor, TextStyle};
+use crate::map_drawing::{Drawing, Px, Shape, Stroke, TextAnchor, TextStyle};
 use crate::palette::WHITE;
 use crate::text::escape;
 use std::fmt::Write;

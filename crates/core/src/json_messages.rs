@@ -49,9 +49,6 @@ impl<T: Serialize + 'static> Serialize for JsonMessages<'_, T> {
 }
 
 /// For `#[serde(serialize_with = ...)]` of a list of messages.
-///
-/// # Errors
-/// Those of the serializer.
 pub fn serialize<T: Serialize + 'static, S: Serializer>(all: &[T], serializer: S) -> Result<S::Ok, S::Error> {
     JsonMessages(all).serialize(serializer)
 }

@@ -20,17 +20,11 @@ pub struct Candidate<'a> {
 
 impl Candidate<'_> {
     /// An unarmed backend.
-    ///
-    /// # Errors
-    /// The backend's error message.
     pub fn create(&self) -> Result<Box<dyn Backend>, String> {
         (self.make)().map_err(|error| error.to_string())
     }
 
     /// An armed backend with its first setpoints.
-    ///
-    /// # Errors
-    /// The backend's error message.
     pub fn create_running(&self) -> Result<Box<dyn Backend>, String> {
         let mut rig = self.create()?;
         require_success("arm", rig.arm())?;
@@ -92,9 +86,6 @@ pub struct NotArmed {
 }
 
 /// Checks all rules, after one trial of arming and disarming.
-///
-/// # Errors
-/// [`NotArmed`] with the rig's error.
 pub fn check_rules(candidate: &Candidate<'_>) -> Result<Vec<(&'static str, CheckResult)>, NotArmed> {
     let armed = (candidate.make)().and_then(|mut rig| {
         rig.arm()?;

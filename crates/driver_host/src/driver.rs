@@ -1,13 +1,11 @@
 //! A driver program as a backend.
 
-use crate::find::DriverError;
-use crate::find::{Endpoint, PREFIX, SearchPath, file_name};
-use crate::link::{Lease, Link};
+use crate::find::{DriverError, Endpoint, PREFIX, SearchPath, file_name};
+use crate::link::{Lease, Link, ROUNDING_S, SampleQueue};
 use crate::protocol::{
     Code, Configure, DescribeResult, Failure, Hello, MAGIC, Message, Poll, Samples, VERSION, Welcome, batch,
     read_description, read_error,
 };
-use crate::sample_queue::{ROUNDING_S, SampleQueue};
 use crate::secrets::Secrets;
 use mapper_core::{
     Backend, BackendError, RigDescription, SampleBatch, SetpointRange, SetpointRanges, Setpoints,
@@ -110,9 +108,6 @@ impl Driver {
     }
 
     /// Starts a driver program, without secrets.
-    ///
-    /// # Errors
-    /// As [`Driver::find`].
     pub fn start_program(
         program: &Path,
         name: &str,
@@ -123,9 +118,6 @@ impl Driver {
     }
 
     /// Connects to a driver that listens on a socket, without secrets.
-    ///
-    /// # Errors
-    /// As [`Driver::find`].
     pub fn connect_socket(
         socket: &Path,
         name: &str,

@@ -12,7 +12,6 @@ mod driver;
 mod find;
 mod link;
 pub mod protocol;
-mod sample_queue;
 mod secrets;
 
 pub use driver::{DEFAULT_TIMEOUTS, Driver, Timeouts};

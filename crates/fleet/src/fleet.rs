@@ -48,9 +48,6 @@ impl Fleet {
     }
 
     /// The kind of the study, from the known kinds.
-    ///
-    /// # Errors
-    /// [`FleetError::UnknownKind`].
     pub fn kind<'a>(&self, kinds: &[&'a dyn Kind]) -> Result<&'a dyn Kind, FleetError> {
         kinds.iter().find(|kind| kind.name() == self.study.kind).copied().ok_or_else(|| {
             let known: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
@@ -160,9 +157,6 @@ impl Output {
     }
 
     /// Writes a file of the result.
-    ///
-    /// # Errors
-    /// [`FleetError::File`].
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), FleetError> {
         let path = self.directory.join(name);
         std::fs::write(&path, bytes).map_err(FleetError::file("write", &path))
@@ -181,15 +175,9 @@ pub trait Kind: Sync {
     fn summary(&self) -> &'static str;
 
     /// The items of a study.
-    ///
-    /// # Errors
-    /// [`FleetError::Kind`] with all mistakes of the study.
     fn items(&self, study: &StudyFile) -> Result<StudyDraft, FleetError>;
 
     /// Processes one item and returns JSON. Equal payloads give equal results on any computer.
-    ///
-    /// # Errors
-    /// [`WorkError`].
     fn work(&self, payload: &Value, at: WorkContext<'_>) -> Result<String, WorkError>;
 
     /// Merges the parts, which come one by one in the order of the study, into the result. Returns a one-line description. Missing
@@ -201,9 +189,6 @@ pub trait Kind: Sync {
 }
 
 /// The kind of this name; if it is unknown, a mistake at its place in the file.
-///
-/// # Errors
-/// [`FleetError::StudyFile`].
 pub fn kind_of<'a>(study: &StudyFile, kinds: &[&'a dyn Kind]) -> Result<&'a dyn Kind, FleetError> {
     if let Some(kind) = kinds.iter().find(|kind| kind.name() == study.kind) {
         return Ok(*kind);

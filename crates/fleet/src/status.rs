@@ -171,9 +171,6 @@ pub struct MergeOutcome {
 impl Fleet {
     /// Merges all parts into `result`; with missing or failed parts only if `partial` is set. Only one part is in memory at a
     /// time. Two concurrent merges write the same bytes.
-    ///
-    /// # Errors
-    /// [`FleetError`] if a file cannot be written, or a part's result has the wrong content for the kind.
     pub fn merge(
         &self,
         kind: &dyn Kind,

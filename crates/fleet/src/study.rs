@@ -104,9 +104,6 @@ impl StudyFile {
     }
 
     /// The complete file, read by the kind; name and kind included.
-    ///
-    /// # Errors
-    /// [`StudyFileError::Mistakes`] with all mistakes.
     pub fn read<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, StudyFileError> {
         let mut notes = Notes::default();
         Schema::of::<T>().check(&self.tree, &mut notes);
@@ -132,9 +129,6 @@ impl StudyFile {
 }
 
 /// Reads name and kind of a study.
-///
-/// # Errors
-/// [`StudyFileError`].
 pub fn open_study(path: &Path) -> Result<StudyFile, StudyFileError> {
     let mistakes = |findings| StudyFileError::Mistakes(Box::new(findings));
     let text = mapper_yaml::open(&DOCUMENT, path, MAX_STUDY_FILE_BYTES)
@@ -170,9 +164,6 @@ pub struct Item {
 
 impl Item {
     /// The content of its file.
-    ///
-    /// # Errors
-    /// The serialiser's: none in practice.
     pub fn bytes(&self) -> Result<Vec<u8>, serde_json::Error> {
         let mut bytes = serde_json::to_vec(self)?;
         bytes.push(b'\n');

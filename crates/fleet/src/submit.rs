@@ -81,9 +81,6 @@ const MEMORY_OVERHEAD_MB: u64 = 128;
 
 impl Fleet {
     /// Submits the remaining items. The number of tasks is the smallest that keeps each within the target duration.
-    ///
-    /// # Errors
-    /// [`FleetError::DoesNotFit`], [`FleetError::NothingLeft`], [`FleetError::Queue`].
     pub fn submit(
         &self,
         options: &SubmitOptions,
@@ -152,9 +149,6 @@ impl Fleet {
     }
 
     /// Submits again the tasks with missing, failed or damaged items, and the merge that follows them.
-    ///
-    /// # Errors
-    /// [`FleetError::NotSubmitted`], [`FleetError::NothingLeft`], [`FleetError::Queue`].
     pub fn retry(&self, machine: &Machine<'_>) -> Result<Submission, FleetError> {
         let before = self.submission()?;
         self.check_not_queued()?;
@@ -170,9 +164,6 @@ impl Fleet {
     }
 
     /// The last submission.
-    ///
-    /// # Errors
-    /// [`FleetError::NotSubmitted`] if there was none.
     pub fn submission(&self) -> Result<Submission, FleetError> {
         let path = self.directory().join(SUBMITTED);
         if !path.exists() {
@@ -305,9 +296,6 @@ impl Template {
     }
 
     /// Another queue, from a file.
-    ///
-    /// # Errors
-    /// [`FleetError::File`].
     pub fn read(path: &Path) -> Result<Template, FleetError> {
         let bytes = read_at_most(path, MAX_FILE_BYTES)?;
         let text = String::from_utf8_lossy(&bytes).into_owned();

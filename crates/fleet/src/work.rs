@@ -287,9 +287,6 @@ impl Fleet {
     }
 
     /// Runs items one at a time until a few are done, and estimates the cost of all. Their results are kept.
-    ///
-    /// # Errors
-    /// As [`Fleet::work`]; [`FleetError::UnknownCost`] if none has a result.
     pub fn estimate_cost(
         &self,
         kind: &dyn Kind,

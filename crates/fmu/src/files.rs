@@ -139,9 +139,6 @@ pub struct FmuFile {
 
 /// Generates all files of a machine's FMU: the description, then the sources. The GUID is a hash of both, so that equal machines give
 /// equal FMUs.
-///
-/// # Errors
-/// [`FmuError::NotFinite`] with the name of the number.
 pub fn files(machine: &FmuMachine<'_>) -> Result<Vec<FmuFile>, FmuError> {
     let (variables, switches) = (variables(machine), switches(machine));
     let header = header(machine, &variables, &switches)?;

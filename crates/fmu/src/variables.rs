@@ -3,8 +3,7 @@
 use mapper_core::{EfficiencyDefinition, FittedMap, FittedNode, InletConvection, ReferenceState};
 use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
 use mapper_physics::compressor_map::tabulated_map::{MapError, MapRow, TabulatedMap};
-use mapper_physics::machine::params::{BoundaryConditions, Params};
-use mapper_physics::machine::state::State;
+use mapper_physics::machine::params::{BoundaryConditions, Params, State};
 
 /// Role of a variable for the importer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -186,9 +185,6 @@ pub fn switches(machine: &FmuMachine<'_>) -> [Switch; 3] {
 const MIN_EFFICIENCY: f64 = 0.05;
 
 /// The speed lines of a fit, including extrapolated ones, without the end on the choke side at which the gas is not compressed.
-///
-/// # Errors
-/// [`MapError`] if the remaining lines cannot be simulated.
 pub fn table_of_fit(fitted: &FittedMap, reference: ReferenceState) -> Result<TabulatedMap, MapError> {
     let compresses =
         |node: &&FittedNode| node.pressure_ratio > 1.0 && (MIN_EFFICIENCY..=1.0).contains(&node.eta);

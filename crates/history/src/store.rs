@@ -74,9 +74,6 @@ fn check_plain(path: &Path) -> Result<(), HistoryError> {
 
 impl History {
     /// Opens the history, creating it if it does not exist.
-    ///
-    /// # Errors
-    /// [`HistoryError`] if the file cannot be created, is not a history, or was written by a newer program.
     pub fn open(path: &Path) -> Result<History, HistoryError> {
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
             std::fs::create_dir_all(parent)
@@ -122,9 +119,6 @@ impl History {
     }
 
     /// Opens a history without writing anything. In a file with a write-ahead log, nights that only the log contains are not visible.
-    ///
-    /// # Errors
-    /// As [`History::open_existing`].
     pub fn open_read_only(path: &Path) -> Result<History, HistoryError> {
         let flags =
             OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
@@ -260,9 +254,6 @@ impl History {
     }
 
     /// Runs, oldest night first, without their points.
-    ///
-    /// # Errors
-    /// [`HistoryError::Sqlite`].
     pub fn runs(&self, filter: &Filter) -> Result<Vec<ListedRun>, HistoryError> {
         self.try_runs(filter).map_err(|source| HistoryError::of_sqlite(&self.path, source))
     }

@@ -29,9 +29,6 @@ pub fn identify(
 }
 
 /// Like [`identify`], with the reason for every step that gives no point.
-///
-/// # Errors
-/// As [`identify`].
 pub fn identify_each(
     recording: &Recording,
     config: &IdentifyConfig,
@@ -61,9 +58,6 @@ pub struct Identified {
 
 /// Like [`identify_each`], with the shared parameters of the points (joint method alone). Compared with a declared rig, if one is given: points
 /// are then doubtful if flow, speed or efficiencies differ from it by more than its tolerances.
-///
-/// # Errors
-/// As [`identify`].
 pub fn identify_recording(
     recording: &Recording,
     config: &IdentifyConfig,

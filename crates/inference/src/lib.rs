@@ -12,7 +12,6 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod hypotheses;
-pub mod interval;
 pub mod mixture;
 pub mod posterior;
 pub mod search;

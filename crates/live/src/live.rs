@@ -1,9 +1,8 @@
 //! The live page of a run: opened before the run, updated during it, closed after it.
 
-use crate::connections::Hub;
 use crate::feed::{Feed, LiveRun};
 use crate::request::Access;
-use crate::server::{OperatorCommand, ServedContent, serve};
+use crate::server::{Hub, OperatorCommand, ServedContent, serve};
 use crate::tls::{Tls, TlsError, TlsFiles, read};
 use mapper_report::page::live_page;
 use mapper_session::SessionEvent;
@@ -56,9 +55,6 @@ impl Live {
     }
 
     /// Starts the server.
-    ///
-    /// # Errors
-    /// [`LiveError::Page`]: none in practice.
     pub fn start(&self, run: &LiveRun<'_>) -> Result<(), LiveError> {
         let Some(listener) = self.listener.lock().ok().and_then(|mut listener| listener.take()) else {
             return Ok(());

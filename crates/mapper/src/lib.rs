@@ -122,6 +122,11 @@
 //! command line and the Python package use this crate. ARCHITECTURE.md has the map of all crates,
 //! docs/explanation/one_campaign.md follows one campaign through them.
 
+#![warn(
+    clippy::missing_errors_doc,
+    reason = "strangers read this documentation; inside, the type of an error says what can fail"
+)]
+
 mod campaign;
 mod diagnosis;
 mod error;

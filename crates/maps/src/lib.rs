@@ -8,14 +8,14 @@
 
 mod assemble;
 mod compare;
-mod line_ends;
 mod map_fit;
 pub mod table;
 mod turbine;
 
 pub use assemble::{AssembleError, RepeatedJump, assemble, convert_efficiency, repeated_jumps};
-pub use compare::{MapComparison, PlaceComparison, SpeedLineComparison, compare};
-pub use line_ends::{DetectedEnd, LineEnds, mark_line_ends};
+pub use compare::{
+    DetectedEnd, LineEnds, MapComparison, PlaceComparison, SpeedLineComparison, compare, mark_line_ends,
+};
 pub use map_fit::{MapFit, MapFitError, MapFitOptions, NearestPlace, fit_map, leave_out};
 pub use turbine::turbine_compare::{TurbineComparison, TurbinePointComparison, compare_turbines};
 pub use turbine::turbine_fit::{

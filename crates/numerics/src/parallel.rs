@@ -19,9 +19,6 @@ pub fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<
 
 /// Like [`map`], with work that may fail. After a failure no later item is started. Earlier items are still finished, so that the returned error
 /// is that of the first failing item for any number of cores.
-///
-/// # Errors
-/// The error of the first item whose work fails.
 pub fn try_map<T, R, E>(items: &[T], work: impl Fn(&T) -> Result<R, E> + Sync) -> Result<Vec<R>, E>
 where
     T: Sync,
@@ -46,9 +43,6 @@ where
 
 /// Like [`try_map`], with at most `threads` items at a time (at least 1) on dedicated threads: for work that takes long, needs much
 /// memory or is itself parallel. `work` also gets the index of the item.
-///
-/// # Errors
-/// The error of the first item whose work fails.
 pub fn try_map_on<T, R, E>(
     threads: usize,
     items: &[T],

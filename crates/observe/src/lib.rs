@@ -8,13 +8,15 @@
 pub mod acceptance;
 pub mod averages;
 pub mod declared;
+pub mod element_fault;
+pub(crate) mod element_judge;
 pub mod energy_balance;
+pub mod fuse;
 mod measured_stand;
 pub mod model_inputs;
 pub mod perturbation;
-pub mod redundant_sensors;
 
 pub use declared::{Declared, declared_uncertainties};
+pub use element_fault::{Contradiction, ElementFault, FaultyElement, FusedChannel};
+pub use fuse::{fuse, judge_elements};
 pub use measured_stand::{Fitted, MeasuredValue, OtherMachine, measure_actuators, same_machine};
-pub use redundant_sensors::element_fault::{Contradiction, ElementFault, FaultyElement, FusedChannel};
-pub use redundant_sensors::fuse::{fuse, judge_elements};

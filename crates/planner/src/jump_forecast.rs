@@ -85,9 +85,6 @@ pub(crate) fn forecast_jump(
 }
 
 /// Forecasts the jump from the steady state of `from`, and lists the limits that it violates.
-///
-/// # Errors
-/// [`PlanError`] if one of the points cannot be reached, or the simulation fails.
 pub fn explain_jump(
     request: &PlanRequest<'_>,
     from: OperatingPoint,
@@ -104,9 +101,6 @@ pub fn explain_jump(
 
 /// Forecasts all jumps between the points by start, then destination, forbidden ones included. Each costs one simulation: use it for tens
 /// of points.
-///
-/// # Errors
-/// Those of [`explain_jump`].
 pub fn forecast_all_jumps(request: &PlanRequest<'_>) -> Result<Vec<JumpForecast>, PlanError> {
     let targets = solve_steady_states(request, request.points)?;
     let dwell_s = request.timing.dwell.fixed_or_usual_s();

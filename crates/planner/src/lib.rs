@@ -9,7 +9,6 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod candidates;
 pub(crate) mod forecast;
 pub mod housing;
 mod jump_forecast;

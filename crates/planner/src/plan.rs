@@ -182,9 +182,6 @@ fn fit_required_error(builder: &PlanBuilder<'_>, required: f64) -> Result<Draft,
 ///
 /// Conventional mapping has no repeats and waits at each point until T2 and the housing drift by less than
 /// [`STABLE_DRIFT_K_MIN`](crate::STABLE_DRIFT_K_MIN).
-///
-/// # Errors
-/// [`PlanError`] if a simulation fails.
 pub fn plan_other_orders(request: &PlanRequest<'_>, plan: &Plan) -> Result<Vec<Plan>, PlanError> {
     let others: Vec<VisitOrder> =
         VisitOrder::ALL.into_iter().filter(|order| order.name() != plan.objective).collect();

@@ -13,15 +13,18 @@
 mod channel_mapping;
 mod error;
 mod jump_steps;
+pub(crate) mod log_reader;
 pub mod logs;
 mod mcap;
-mod reading;
+pub(crate) mod recording_reader;
 mod samples;
+pub(crate) mod scan;
 pub mod score;
 mod steps;
-mod writing;
+pub(crate) mod topics;
+pub(crate) mod writer;
 
-pub use crate::writing::topics::FormatVersion;
+pub use crate::topics::FormatVersion;
 pub use channel_mapping::channel_map::{
     AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, WindowLimits,
 };
@@ -30,7 +33,7 @@ pub use error::{BatchError, DamagedPart, ReadWarning, RecordError, StepsFound};
 pub use mapper_yaml::Findings;
 pub use mapper_yaml::units::{Kind, Unit, UnitError};
 pub use mcap::ChunkError;
-pub use reading::recording_reader::{ReadReport, read_marks, read_recording, read_recording_from};
-pub use reading::scan::ReadOptions;
-pub use writing::topics::{RecordingHeader, StepPhase};
-pub use writing::writer::RecordingWriter;
+pub use recording_reader::{ReadReport, read_marks, read_recording, read_recording_from};
+pub use scan::ReadOptions;
+pub use topics::{RecordingHeader, StepPhase};
+pub use writer::RecordingWriter;

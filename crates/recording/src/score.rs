@@ -2,13 +2,13 @@
 //!
 //! Code that identifies, corrects or diagnoses must not use this module; a test of the source tree lists its users.
 
+use crate::log_reader::is_mcap;
 use crate::logs::LogFile;
 use crate::mcap::{ChannelDefinition, FieldValue, Sink, read_fields};
-use crate::reading::log_reader::is_mcap;
-use crate::reading::recording_reader::open;
-use crate::reading::scan::scan;
+use crate::recording_reader::open;
 use crate::samples::series_builder::run_time_s;
-use crate::writing::topics::{METADATA_NAME, START_KEY, TRUTH_TOPIC};
+use crate::scan::scan;
+use crate::topics::{METADATA_NAME, START_KEY, TRUTH_TOPIC};
 use crate::{ReadOptions, ReadWarning, RecordError};
 use mapper_core::{Channel, IdentifiedPoint, Recording, ReferenceState, StepMarker, SurgeMark, TruthColumn};
 use mapper_numerics::statistics::{mean, median};
@@ -65,9 +65,6 @@ pub struct PendingTruths<'scope>(ScopedJoinHandle<'scope, Result<Vec<Truth>, Rec
 
 impl PendingTruths<'_> {
     /// Waits until they are read.
-    ///
-    /// # Errors
-    /// As [`read_truth`].
     pub fn wait(self) -> Result<Vec<Truth>, RecordError> {
         self.0.join().unwrap_or_else(|panicked| std::panic::resume_unwind(panicked))
     }
@@ -186,9 +183,6 @@ impl Truth {
 }
 
 /// Reads the truth of a recording; empty if it has none, like the log of another program.
-///
-/// # Errors
-/// As [`read_recording`](crate::read_recording).
 pub fn read_truth(path: &Path) -> Result<Truth, RecordError> {
     if !is_mcap(&LogFile::from_path(path).head(8)?) {
         return Ok(Truth::default());

@@ -17,7 +17,6 @@ mod pictures;
 mod plan;
 mod point_results;
 mod side_diagnosis;
-mod studies;
 mod test_report;
 mod thermal_model;
 
@@ -30,7 +29,7 @@ pub use formatting::{
 };
 pub use log_text::log_contents;
 pub use map_documents::{map_fit, reduced_map, reduced_turbine, turbine_fit};
-pub use nights::{listed_run_json, listed_runs, night_comparison, night_groups};
+pub use nights::{listed_run_json, listed_runs, night_comparison, night_groups, study_status};
 pub use page::run_page::gap_page;
 pub use page::widgets::OtherRun;
 pub use pictures::{distinct_names, error_figure, heat_transfer_figure, history_svg, map_comparison_figure};
@@ -44,7 +43,6 @@ pub use plan::plan_remark_text::guard_trip_text;
 pub use point_results::budget_table::budget_csv;
 pub use point_results::summary::PointResults;
 pub use side_diagnosis::why_figure;
-pub use studies::study_status;
 pub use test_report::key_figures::{PointsOrigin, first_campaign};
 pub use test_report::run_report::{ReportSource, RunReport, instant};
 pub use test_report::zero_and_sensors::SurgeReport;

@@ -57,9 +57,6 @@ struct InstrumentError {
 impl RigWithInstruments {
     /// `rig` with the auxiliary instruments `readers`. In simulated time each instrument is polled together with the rig. Otherwise each
     /// has its own thread, and `deadline` to connect.
-    ///
-    /// # Errors
-    /// [`BackendError::Lost`] if no thread can be started.
     pub fn new(
         rig: Box<dyn Backend>,
         readers: Vec<AuxiliaryInstrument>,

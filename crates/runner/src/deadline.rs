@@ -76,9 +76,6 @@ pub(crate) fn answer_on_thread<C: Send + 'static, A: Send + 'static>(
 
 impl DeadlineBackend {
     /// `backend` with these deadlines for its calls.
-    ///
-    /// # Errors
-    /// [`BackendError::Lost`] if no thread can be started.
     pub fn new(mut backend: Box<dyn Backend>, deadlines: Deadlines) -> Result<Self, BackendError> {
         let description = backend.describe();
         let done = SampleBatch::default;

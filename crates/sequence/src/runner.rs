@@ -48,9 +48,6 @@ pub struct SequenceRunner {
 
 impl SequenceRunner {
     /// Prepares the script; it starts to run at the first [`next_step`](Self::next_step).
-    ///
-    /// # Errors
-    /// [`SequenceError::Thread`] if no thread can be started.
     pub fn start(script: Script, request: SequenceRequest) -> Result<Self, SequenceError> {
         // A buffer of one, so that a request does not wait while the script is parsed.
         let (to_script, from_caller) = sync_channel(1);

@@ -15,7 +15,6 @@ mod machine;
 mod nightly;
 mod plan;
 pub mod recording;
-mod registry;
 mod rig;
 mod run;
 mod session;
@@ -48,7 +47,6 @@ pub use recording::files::{DIAGNOSIS_FORMAT, Existing, Versioned, json_text, wri
 pub use recording::identification_config::{declared, identification};
 pub use recording::recording_file::{Recorded, channel_map, check_all_distinct, inspect_log};
 pub use recording::resume::InterruptedRun;
-pub use registry::Registry;
 pub use rig::drive::{Pace, drive, soak_s};
 pub use rig::rig_state::{RigStates, RigStatus, shared_state_directory};
 pub use rig::sources::Sources;
@@ -56,7 +54,7 @@ pub use run::commissioning::Commissioning;
 pub use run::preflight::load_on;
 pub use run::prepared_run::{PreparedRun, RecordedRun, RunOutcome, RunRequest};
 pub use run::run_stop::{Phase, RunStop, SignalResponse};
-pub use session::{Session, SessionEvent};
+pub use session::{Registry, Session, SessionEvent};
 
 #[cfg(test)]
 #[path = "../tests/common/shipped.rs"]

@@ -67,9 +67,6 @@ pub struct PreparedNight {
 
 impl PreparedNight {
     /// Reads every campaign of the night, so that mistakes are found before any run.
-    ///
-    /// # Errors
-    /// [`SessionError`] of the first campaign that cannot be part of a night.
     pub fn new(nightly: &Nightly) -> Result<Self, SessionError> {
         let mut runs: Vec<NightlyRun> = Vec::new();
         let mut keys = BTreeSet::new();
@@ -155,9 +152,6 @@ impl Session<'_> {
     }
 
     /// Makes one run in a new directory and deletes it afterwards, because a night of recordings may not fit on the disk.
-    ///
-    /// # Errors
-    /// As [`Session::run_night`].
     pub fn nightly_run(&self, run: &NightlyRun, directory: &Path) -> Result<RunRow, SessionError> {
         std::fs::create_dir(directory).map_err(SessionError::file("create", directory))?;
         let row = run.run(self, directory);
@@ -243,9 +237,6 @@ impl NightlyRun {
 
     /// Identifies one recording by each of the methods and returns the points with their truth, as in a run's `points.json`. The inner `Err` is
     /// the reason if a guard stopped the run.
-    ///
-    /// # Errors
-    /// [`SessionError`] if the campaign cannot be planned, run or identified.
     pub fn points(
         &self,
         session: &Session<'_>,
@@ -368,9 +359,6 @@ pub fn night_report_path(history: &Path, started_ms: i64) -> PathBuf {
 }
 
 /// Writes the report of the night, with a row for each run.
-///
-/// # Errors
-/// [`SessionError::File`] if it cannot be written.
 pub fn write_night_report(
     history: &Path,
     night: &Night,

@@ -1,9 +1,22 @@
-//! Common data of all session operations, and their events, as data for observers.
+//! The session with its plug-ins.
 
-use crate::Registry;
-use mapper_core::{Channel, Event, IdentifiedPoint, RigDescription, StepMarker};
+use crate::SessionError;
+use crate::recording::identification_config::declared;
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::BackendChoice;
+use mapper_core::{
+    Backend, BackendError, Channel, DeclaredUncertainty, Event, IdentifiedPoint, MapFormats, RigDescription,
+    Sentences, SetpointRanges, StepMarker,
+};
+use mapper_physics::rig::backend_plugin::{BackendPlugin, NominalRig, ReadEffect};
+use mapper_physics::rig::effect::Effect;
+use mapper_physics::simulation::model::Model;
+use mapper_recording::ChannelMap;
+use mapper_recording::logs::LogFormats;
 use mapper_runner::Operator;
 use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Plug-ins, an observer and stop flags.
@@ -106,3 +119,132 @@ pub enum SessionEvent {
 
 /// Called with every event, from any thread that works for the session.
 pub type OnEvent<'a> = &'a (dyn Fn(&SessionEvent) + Sync);
+
+/// Creates a driver, a backend that is not a plug-in, from its name and settings.
+pub type MakeDriver =
+    Arc<dyn Fn(&str, &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> + Send + Sync>;
+
+/// All plug-ins of a session, and the source commit of the program that creates it.
+#[derive(Clone)]
+pub struct Registry {
+    /// Rigs, real and simulated.
+    pub backends: Vec<BackendPlugin>,
+    /// Factory for backends that are not plug-ins; `None` without drivers.
+    pub driver: Option<MakeDriver>,
+    /// The effect library.
+    pub effects: Vec<Arc<dyn Effect>>,
+    /// Reads a suspected effect from a file.
+    pub read_effect: ReadEffect,
+    /// Map formats, read and written.
+    pub formats: MapFormats,
+    /// Log formats of other programs.
+    pub logs: LogFormats,
+    /// Sentences of warnings and remarks in written JSON; `None` writes their values alone.
+    pub sentences: Option<Sentences>,
+    /// Commit that the program was built from; empty if unknown.
+    pub commit: &'static str,
+}
+
+impl Registry {
+    /// A registry without plug-ins, to which its user adds those that are needed. It runs no campaign without a backend, and diagnoses nothing
+    /// without an effect library.
+    pub fn empty() -> Self {
+        Registry {
+            backends: Vec::new(),
+            driver: None,
+            effects: Vec::new(),
+            read_effect: no_effect,
+            formats: MapFormats(&[]),
+            logs: LogFormats::default(),
+            sentences: None,
+            commit: "",
+        }
+    }
+
+    /// The backend that a campaign names: a plug-in, or a driver of that name.
+    ///
+    /// # Errors
+    /// [`SessionError::Backend`] if the name is unknown or the settings are wrong.
+    pub fn make_backend(&self, campaign: &Campaign, model: &Model) -> Result<Box<dyn Backend>, SessionError> {
+        self.make_named_backend(&campaign.backend, campaign, model).map_err(SessionError::Backend)
+    }
+
+    /// Setpoint ranges of a campaign's rig, if they are known without starting a driver.
+    pub(crate) fn setpoint_ranges(&self, campaign: &Campaign, model: &Model) -> Option<SetpointRanges> {
+        let BackendChoice { name, settings, .. } = &campaign.backend;
+        let nominal = nominal_rig(campaign, model, self);
+        BackendPlugin::make_by_name(&self.backends, name, &nominal, settings).ok()?.describe().accepts
+    }
+
+    /// Creates one backend by name.
+    pub(crate) fn make_named_backend(
+        &self,
+        wanted: &BackendChoice,
+        campaign: &Campaign,
+        model: &Model,
+    ) -> Result<Box<dyn Backend>, BackendError> {
+        if let Some(driver) =
+            self.driver.as_ref().filter(|_| !self.backends.iter().any(|plugin| plugin.name == wanted.name))
+        {
+            return driver(&wanted.name, &wanted.settings);
+        }
+        let nominal = nominal_rig(campaign, model, self);
+        BackendPlugin::make_by_name(&self.backends, &wanted.name, &nominal, &wanted.settings)
+    }
+
+    /// The effect library with effects defined by scripts.
+    ///
+    /// # Errors
+    /// A script that cannot be read, is not an effect, or reuses the name of another.
+    pub fn effects_with(&self, scripts: &[PathBuf]) -> Result<Vec<Arc<dyn Effect>>, SessionError> {
+        let mut effects = self.effects.clone();
+        for path in scripts {
+            let scripted = (self.read_effect)(path)
+                .map_err(|error| error.downcast().map_or_else(SessionError::Effect, |known| *known))?;
+            let id = &scripted.info().id;
+            if effects.iter().any(|effect| effect.info().id == *id) {
+                return Err(SessionError::DuplicateEffect { path: path.clone(), id: id.to_string() });
+            }
+            effects.push(scripted);
+        }
+        Ok(effects)
+    }
+}
+
+fn no_effect(path: &Path) -> Result<Arc<dyn Effect>, Box<dyn std::error::Error + Send + Sync>> {
+    Err(Box::new(SessionError::EffectFilesUnsupported(path.to_owned())))
+}
+
+/// Nominal machine and rig data for a backend.
+fn nominal_rig(campaign: &Campaign, model: &Model, registry: &Registry) -> NominalRig {
+    let sensors = || campaign.sensors.iter();
+    // The errors that identification assumes are drawn too.
+    let declared = declared(campaign, &ChannelMap::native());
+    let assumed_gain = |channel: &Channel, sensor: &mut DeclaredUncertainty| {
+        if sensor.gain_sigma_ratio == 0.0 {
+            sensor.gain_sigma_ratio = declared.get(channel).map_or(0.0, |declared| declared.gain_sigma_ratio);
+        }
+    };
+    NominalRig {
+        model: model.clone(),
+        boundary: campaign.boundary,
+        actuators: campaign.rig_actuators(),
+        speed_max_rpm: campaign.limits.speed_max_rpm,
+        redundant: sensors()
+            .filter_map(|(channel, sensor)| {
+                let mut several = sensor.redundant.clone()?;
+                several.elements.iter_mut().for_each(|one| assumed_gain(channel, &mut one.declared));
+                Some((*channel, several))
+            })
+            .collect(),
+        static_tap_pipe_diameters_m: sensors()
+            .filter_map(|(channel, sensor)| Some((*channel, sensor.static_tap_pipe_diameter_m?)))
+            .collect(),
+        sensors: declared,
+        tolerances: campaign.tolerances,
+        soak: campaign.zero,
+        effects: registry.effects.clone(),
+        read_effect: registry.read_effect,
+        seed: campaign.seed,
+    }
+}

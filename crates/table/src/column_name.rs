@@ -1,7 +1,6 @@
 //! Reads quantity and place from the name of a column.
 
-use crate::name_parts::{Tag, Token, parts_of, split_tag};
-use crate::words::{Measured, Word};
+use crate::name_parts::{Measured, Tag, Token, Word, parts_of, split_tag};
 use mapper_core::Channel;
 
 /// A place of a turbocharger.

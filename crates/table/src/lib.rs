@@ -17,13 +17,13 @@ mod name_parts;
 mod number;
 mod text;
 mod units;
-mod words;
 mod workbook;
 mod xls;
 mod xlsx_limits;
 
 pub use column_name::{Clarity, ColumnName, Place, channel_at};
 pub use instant::{DateOrder, Instant, NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant};
+pub use name_parts::{Measured, Word};
 pub use number::{
     NO_READING, is_missing, is_missing_mark, number_in, number_with_unit, parse_number, read_number,
 };
@@ -34,7 +34,6 @@ pub use units::{
     HeaderUnit, Reference, bare_unit, difference, header_unit, is_dimensionless, is_reduced_unit, is_unit,
     is_units_row, is_units_row_of_names, kind_of, parse_quantity, remedy, split_unit, unit, volume_flow_m3_s,
 };
-pub use words::{Measured, Word};
 pub use workbook::{Book, SheetRows, Value, decimal_sign_of_cells, is_workbook};
 pub use xls::{Cell, Sheet, XLS_MAGIC, read_xls};
 pub use xlsx_limits::{XlsxLimits, check_xlsx};

@@ -357,9 +357,6 @@ pub fn unit(kind: Kind, spelling: &str) -> Result<&'static Unit, UnitError> {
 }
 
 /// Parses a number with its unit, such as `29e-3 m^2`, to SI and rpm. A ratio needs no unit.
-///
-/// # Errors
-/// [`UnitError`] for what is not a finite number, for an unknown unit, and for a missing one.
 pub fn parse_quantity(kind: Kind, text: &str) -> Result<f64, UnitError> {
     parse_with(kind, text, |spelling| match spelling {
         "" => (kind == Kind::Fraction).then_some(&BARE_RATIO),

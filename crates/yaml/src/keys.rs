@@ -27,9 +27,6 @@ pub enum KeyError {
 }
 
 /// Sets the key `name` of a description.
-///
-/// # Errors
-/// [`KeyError`] for an unknown key and for a value that is not valid for it.
 pub fn set_key<T>(keys: &[Key<T>], description: &mut T, name: &str, value: &str) -> Result<(), KeyError> {
     let shown = |text: &str| text.chars().take(MAX_SHOWN).collect();
     let Some(key) = keys.iter().find(|key| key.name == name) else {

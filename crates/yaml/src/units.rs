@@ -356,17 +356,11 @@ fn wrong_unit_remedy(unit: &str, kind: Kind, units: &str) -> String {
 /// Parses a number and its unit, e.g. `110 krpm`; the result is in SI units, except shaft speed in rpm.
 ///
 /// Sign, decimal point and exponent are allowed; the blank before the unit may be missing.
-///
-/// # Errors
-/// [`UnitError`], with its [`remedy`](UnitError::remedy).
 pub fn parse(kind: Kind, text: &str) -> Result<f64, UnitError> {
     parse_with(kind, text, |spelling| kind.unit(spelling))
 }
 
 /// Like [`parse`], with the units that `unit_of` returns. The spelling of a bare number's unit is empty.
-///
-/// # Errors
-/// The same as those of [`parse`].
 pub fn parse_with(
     kind: Kind,
     text: &str,

@@ -1,6 +1,6 @@
 //! Map format `csv`: one table with a heading, read and written.
 
-use crate::heading::{GAS_PREFIX, digits, number};
+use crate::simulation_table::{GAS_PREFIX, digits, number};
 use ::csv::{ReaderBuilder, StringRecord, Trim};
 use mapper_core::{
     CommonErrors, CompressorMap, EfficiencyDefinition, ExportError, ImportError, ImportedMap, MapDescription,
@@ -352,9 +352,9 @@ fn header(map: &CompressorMap) -> String {
          the rest of an interval is the point's own\n\
          # step: number of the step in its run, from 1\n\
          # h: heat-transfer coefficient between gas and compressor housing; warnings: codes separated by semicolons\n",
-        crate::heading::heading(map, "#"),
+        crate::simulation_table::heading(map, "#"),
         map.method,
-        crate::heading::efficiency_name(map.method),
+        crate::simulation_table::efficiency_name(map.method),
     )
 }
 

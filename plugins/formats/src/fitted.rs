@@ -1,7 +1,7 @@
 //! The fitted surface as CSV: one row per node with its errors, extrapolation marked.
 
 use crate::csv::{Column, write_table};
-use crate::heading::{heading, number};
+use crate::simulation_table::{heading, number};
 use mapper_core::{CompressorMap, ExportError, FittedLine, FittedMap, FittedNode, MapFormat};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {

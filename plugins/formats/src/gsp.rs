@@ -1,8 +1,7 @@
 //! GSP and GasTurb: tables of flow, efficiency and pressure ratio over beta and corrected speed
 //! ([form of the tables](https://www.gspteam.com/GSPsupport/OnlineHelp/map_table_format.htm)).
 
-use crate::heading::heading;
-use crate::simulation_table::SimulationTable;
+use crate::simulation_table::{SimulationTable, heading};
 use mapper_core::{CompressorMap, ExportError, MapFormat};
 use std::fmt::Write;
 

@@ -4,7 +4,6 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod heading;
 mod map_picture;
 mod simulation_table;
 mod turbine;

@@ -1,6 +1,6 @@
 //! The picture of a map: lines, points, contours of efficiency, and the fitted surface.
 
-use crate::heading::{efficiency_name, percent, speed};
+use crate::simulation_table::{efficiency_name, percent, speed};
 use mapper_chart::efficiency_mesh::{SUBDIVISIONS, interpolate_between_lines, points_surge_to_choke};
 use mapper_chart::{
     Axis, Contours, Dash, Figure, Line, LineDrawing, LineEnd, MapDrawing, Marker, NodeDrawing, Panel,

@@ -3,8 +3,7 @@
 //! "MAT-File Format" (MathWorks), chapter 2: each matrix is five 32-bit integers (type, rows, columns, imaginary part, length of the name), the
 //! name with a zero behind it, and the numbers column by column. Level 4 has no structures, and needs no compression or alignment.
 
-use crate::heading::{digits, heading};
-use crate::simulation_table::SimulationTable;
+use crate::simulation_table::{SimulationTable, digits, heading};
 use mapper_core::{CompressorMap, ExportError, ImportError, ImportedMap, MapDescription, MapFormat};
 use mapper_maps::table::{DEFINITION_PREFIX, read_text};
 

@@ -4,8 +4,7 @@
 //! Modelica Standard Library 4.0, `Modelica.Blocks.Tables`: text files begin with `#1`; a table is
 //! `double name(rows, columns)`. Its first row has one unused number and the values of u2, its first column the values of u1.
 
-use crate::heading::heading;
-use crate::simulation_table::{SimulationTable, joined};
+use crate::simulation_table::{SimulationTable, heading, joined};
 use mapper_core::{CompressorMap, ExportError, MapFormat};
 use std::fmt::Write;
 

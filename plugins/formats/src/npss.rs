@@ -1,7 +1,6 @@
 //! NPSS: nested tables over beta and corrected speed.
 
-use crate::heading::heading;
-use crate::simulation_table::{SimulationTable, joined};
+use crate::simulation_table::{SimulationTable, heading, joined};
 use mapper_core::{CompressorMap, ExportError, MapFormat};
 use std::fmt::Write;
 

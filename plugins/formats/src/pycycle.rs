@@ -3,8 +3,7 @@
 //! Rline runs from 1 at surge (`RlineStall`) to 3 at choke. pyCycle scales a map to its design point: any units are valid
 //! if they are declared (`units`).
 
-use crate::heading::heading;
-use crate::simulation_table::{SimulationTable, joined};
+use crate::simulation_table::{SimulationTable, heading, joined};
 use mapper_core::{CompressorMap, ExportError, MapFormat};
 use std::fmt::Write;
 

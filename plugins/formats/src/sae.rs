@@ -3,7 +3,7 @@
 //!
 //! Manufacturers' files may begin with a title, wheel diameters and column names: [`mapper_maps::table`] reads them.
 
-use crate::heading::heading;
+use crate::simulation_table::heading;
 
 use mapper_core::{CompressorMap, ExportError, MapFormat};
 use mapper_maps::table::read_any_bytes;

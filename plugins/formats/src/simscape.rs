@@ -1,8 +1,7 @@
 //! Simscape: a MATLAB script with M x N tables over corrected speed and beta (Compressor (G)), and, for Powertrain
 //! Blockset, flow and efficiency over corrected speed and pressure ratio.
 
-use crate::heading::heading;
-use crate::simulation_table::{SimulationTable, joined};
+use crate::simulation_table::{SimulationTable, heading, joined};
 use mapper_core::{CompressorMap, ExportError, MapFormat};
 use std::fmt::Write;
 

@@ -1,7 +1,7 @@
 //! The measured surge-side ends as CSV: one row per speed line.
 
 use crate::csv::{Column, write_table};
-use crate::heading::{heading, number};
+use crate::simulation_table::{heading, number};
 use mapper_core::{CompressorMap, ExportError, MapFormat, SurgeFoundBy, SurgeMark};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {

@@ -1,6 +1,6 @@
 //! Maps of turbines: tables of points with exact digits, the fitted table with its intervals, and tables for simulation programs.
 
-use crate::heading::digits;
+use crate::simulation_table::digits;
 use mapper_core::{
     ExportError, FittedTurbine, FittedTurbineLine, FittedTurbineNode, ImportError, ImportedTurbine,
     MapDescription, TurbineFormat, TurbineMap, one_line,

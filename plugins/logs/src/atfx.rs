@@ -3,7 +3,7 @@
 //! Servers name elements and attributes differently; the application model at the start of a file maps them to the base model. Read as
 //! openATFX does (github.com/peak-solution/openatfx), whose examples are ASAM's.
 
-use crate::columns::table_head::MAX_COLUMNS;
+use crate::table_head::MAX_COLUMNS;
 use crate::tables::column_log::{Chunk, ColumnTable, check_columns_file, column_log};
 use mapper_recording::logs::limits::{MAX_UNPACKED_BYTES, max_memory_bytes};
 use mapper_recording::logs::{Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};

@@ -1,6 +1,6 @@
 //! CSV and similar formats: cells with a separator between them.
 
-use crate::columns::clock::HEAD_ROWS;
+use crate::clock::HEAD_ROWS;
 use crate::tables::long_table::{LongForm, LongRows};
 use crate::tables::table_row::RowStream;
 use crate::tables::table_log::{Origin, Table};

@@ -5,8 +5,10 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod columns;
+pub(crate) mod clock;
+pub(crate) mod clock_choice;
 mod mdf;
+pub(crate) mod table_head;
 mod tables;
 
 use mapper_recording::logs::LogFormats;

@@ -3,7 +3,7 @@
 //! Format: MathWorks, MAT-File Format (2005-2024), chapter 1. A matrix becomes one column per column of it; texts, cells, objects and complex or
 //! sparse numbers are left out.
 
-use crate::columns::table_head::MAX_COLUMNS;
+use crate::table_head::MAX_COLUMNS;
 use crate::tables::column_log::{Chunk, ColumnTable, check_columns_file, column_log};
 use mapper_recording::logs::limits::{MAX_UNPACKED_BYTES, max_memory_bytes};
 use mapper_recording::logs::{Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};

@@ -1,9 +1,9 @@
 //! TDMS: the files of LabVIEW and of National Instruments' loggers. Each group is a table; waveform channels have their own rate.
 
-use crate::columns::clock::HEAD_ROWS;
-use crate::columns::table_head::MAX_COLUMNS;
+use crate::clock::HEAD_ROWS;
+use crate::table_head::MAX_COLUMNS;
 use crate::tables::column_log::{COLUMN_OPTIONS, Chunk, Chunks, ColumnRows};
-use crate::tables::joined_tables::{Part, join_tables};
+use crate::tables::long_table::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
 use mapper_recording::logs::{
     Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, ReadSeek, Row, RowSink,

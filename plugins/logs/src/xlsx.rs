@@ -1,7 +1,7 @@
 //! Excel workbooks, with a table on each sheet.
 
-use crate::columns::clock::HEAD_ROWS;
-use crate::tables::joined_tables::{Part, join_tables};
+use crate::clock::HEAD_ROWS;
+use crate::tables::long_table::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
 use crate::tables::table_row::{Cell, Cells, Rows};
 use mapper_recording::logs::limits::{max_memory_bytes, max_unpacked_bytes};

@@ -145,9 +145,6 @@ pub struct UnreachablePoint {
 }
 
 /// The nominal model of a campaign, on its map.
-///
-/// # Errors
-/// [`NominalTableError`] if the map file's text is not a map; this cannot happen in a checked campaign.
 pub fn nominal_model(campaign: &Campaign) -> Result<Model, NominalTableError> {
     let params = campaign.machine.params;
     let map: Arc<dyn CompressorCharacteristic> = match campaign.machine.map.table() {

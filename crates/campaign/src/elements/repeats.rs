@@ -96,9 +96,6 @@ pub struct SequenceSource {
 }
 
 /// Reads the script that a campaign names.
-///
-/// # Errors
-/// If it can no longer be read.
 pub(crate) fn sequence(
     name: Option<&str>,
     origin: &Path,

@@ -103,9 +103,6 @@ impl MapFormat {
     }
 
     /// Writes a file with `map`.
-    ///
-    /// # Errors
-    /// [`ExportError`]: the format is read-only, or it cannot represent this map.
     pub fn write(&self, map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
         match self.write {
             Some(write) => write(map),
@@ -114,9 +111,6 @@ impl MapFormat {
     }
 
     /// Writes a map in display units, if the format is a picture.
-    ///
-    /// # Errors
-    /// Those of [`MapFormat::write`].
     pub fn write_in(&self, map: &CompressorMap, units: &MapUnits) -> Result<Vec<u8>, ExportError> {
         self.draw.map_or_else(|| self.write(map), |draw| draw(map, units))
     }
@@ -135,9 +129,6 @@ impl MapFormat {
     }
 
     /// Writes a file with the map of a turbine.
-    ///
-    /// # Errors
-    /// [`ExportError`]: the format has no turbine maps, or it cannot represent this one.
     pub fn write_turbine(&self, map: &TurbineMap) -> Result<Vec<u8>, ExportError> {
         match self.turbine.write {
             Some(write) => write(map),
@@ -146,9 +137,6 @@ impl MapFormat {
     }
 
     /// Parses the map of a turbine.
-    ///
-    /// # Errors
-    /// Those of [`MapFormat::read`].
     pub fn read_turbine(
         &self,
         bytes: &[u8],

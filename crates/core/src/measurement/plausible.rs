@@ -151,9 +151,6 @@ pub struct Implausible {
 }
 
 /// Checks the median reading of a channel, SI.
-///
-/// # Errors
-/// [`Implausible`] with the likely cause and the remedy.
 pub fn check_running(channel: Channel, median: f64) -> Result<(), Implausible> {
     if plausible(channel).running.contains(&median) {
         return Ok(());

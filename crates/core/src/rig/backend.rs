@@ -138,9 +138,6 @@ pub trait Backend: Send {
 
     /// Holds the last setpoints while an operator inspects the run. A rig that keeps its setpoints does nothing;
     /// a rig with a controller sends them again, which shows whether the controller still accepts them.
-    ///
-    /// # Errors
-    /// Those of [`set`](Backend::set).
     fn hold(&mut self) -> Result<(), BackendError> {
         Ok(())
     }

@@ -49,9 +49,6 @@ impl<T: Steps> Steps for Vec<T> {
 }
 
 /// Writes the numbers of steps.
-///
-/// # Errors
-/// The errors of the serializer.
 pub fn serialize<S: Serializer>(indices: &impl Steps, serializer: S) -> Result<S::Ok, S::Error> {
     indices.numbers().serialize(serializer)
 }
@@ -81,9 +78,6 @@ pub mod entry {
     }
 
     /// Writes `step`.
-    ///
-    /// # Errors
-    /// The errors of the serializer.
     pub fn serialize<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
         StepField { step: step_number(*index) }.serialize(serializer)
     }

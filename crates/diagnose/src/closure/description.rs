@@ -1,11 +1,10 @@
 //! A closure term as a sentence with numbers, and as an effect script.
 
-use crate::closure::balance::Balance;
 use crate::closure::expression::Expression;
 use crate::closure::library::REFERENCE_K;
 use crate::closure::select::FittedClosure;
-use crate::closure::term::{Role, Term};
-use crate::gap::findings::report::ClosureCoefficient;
+use crate::closure::term::{Balance, Role, Term};
+use crate::gap::report::ClosureCoefficient;
 use mapper_core::unit_factors::ICE_POINT_K;
 use mapper_core::{half_width_95, with_unit};
 use std::fmt::Write as _;

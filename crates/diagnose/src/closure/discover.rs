@@ -1,11 +1,11 @@
 //! Searches for closure terms that explain the residual of a diagnosis, and locates their source terms.
 
-use crate::closure::balance::{Balance, Properties};
 use crate::closure::columns::{Base, Products};
 use crate::closure::description::{ClosureDescription, describe, script_of};
 use crate::closure::library as term_library;
 use crate::closure::residual_source::{ResidualSource, residual_sources};
 use crate::closure::select::{Choice, FittedClosure, TermSearch, begun, choices, keep_determined, promising};
+use crate::closure::term::{Balance, Properties};
 use crate::gap::best_fit::fit::{Effort, Fit, adequacy, fit, misfit_of_steps, with_start_read};
 use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::additions::Calibration;
@@ -14,9 +14,9 @@ use crate::gap::causes::place::{
 };
 use crate::gap::causes::probabilities::weight;
 use crate::gap::causes::select::MIN_GAP_REDUCTION;
-use crate::gap::findings::report::{BalanceClosure, ClosureTerm, MAX_EQUIVALENT, Place};
 use crate::gap::gap_reduction::{FOLDS, channels_on};
 use crate::gap::library_fits::LibraryFits;
+use crate::gap::report::{BalanceClosure, ClosureTerm, MAX_EQUIVALENT, Place};
 use crate::gap::residuals::study::{Study, members};
 use crate::gap::verdict::Explained;
 use mapper_core::half_width_95;

@@ -3,7 +3,6 @@
 //! Step sizes come from the physics of such a machine, not from a recording. The oil takes 8 W/K, gas and housing exchange some
 //! 20 W/K, the shaft carries a tenth of a newton metre.
 
-use crate::closure::balance::{Balance, PLAIN_FLOW_KG_S, PLAIN_HEAT_W, PLAIN_LAG_S, PLAIN_TORQUE_NM};
 use crate::closure::expression::Expression::{Number, Of, Value};
 use crate::closure::expression::Quantity::{
     Ambient, Bearing, Flow, Oil, P1, P2, P3, P4, PressureRatio, Speed, T1, T2, T2Prime, T3, Tc, Tt,
@@ -11,7 +10,9 @@ use crate::closure::expression::Quantity::{
 use crate::closure::expression::{
     Expression, Quantity, above, below, difference, fourth_powers, minus, power, product, times,
 };
-use crate::closure::term::{Role, Term};
+use crate::closure::term::{
+    Balance, PLAIN_FLOW_KG_S, PLAIN_HEAT_W, PLAIN_LAG_S, PLAIN_TORQUE_NM, Role, Term,
+};
 use mapper_core::Channel;
 use mapper_physics::laws::housing::STEFAN_BOLTZMANN_W_M2K4;
 

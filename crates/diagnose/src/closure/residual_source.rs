@@ -3,10 +3,9 @@
 //! In each step the source term has a level and a part that decays after the jump. Both are Gaussian processes: a common level, a part
 //! smooth over speed and opening, and a small free part per step. The evidence determines their size.
 
-use crate::closure::balance::{Balance, Properties};
 use crate::closure::columns::{Base, Posterior, Products, weigh_process};
 use crate::closure::expression::{DECAY, Expression, Span, Spans};
-use crate::closure::term::{Role, Term};
+use crate::closure::term::{Balance, Properties, Role, Term};
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::prediction::PointState;
 use crate::gap::residuals::study::Study;

@@ -7,7 +7,7 @@ use crate::closure::term::{ClosureEffect, Role, Term};
 use crate::gap::best_fit::fit::{Effort, Fit, Start, fit};
 use crate::gap::best_fit::normal::{PRIOR_STEPS, Selection};
 use crate::gap::causes::select::MIN_GAP_REDUCTION;
-use crate::gap::findings::report::MAX_EQUIVALENT;
+use crate::gap::report::MAX_EQUIVALENT;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::step_number;

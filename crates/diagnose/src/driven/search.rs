@@ -6,7 +6,7 @@ use crate::driven::side_diagnosis::NotDiagnosable;
 use crate::gap::best_fit::coordinate::{Coordinate, typical};
 use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::{evidence_needed, prior_of_number, smallest_size};
-use crate::gap::findings::report::{SmallestSeen, size_in_words};
+use crate::gap::report::{SmallestSeen, size_in_words};
 use crate::gap::residuals::study::{Hypothesis, members};
 use mapper_inference::posterior::{CauseProbabilities, CauseSet, Rules, shares};
 use mapper_inference::search::{Causes, Extension, Known, Limits, extend};

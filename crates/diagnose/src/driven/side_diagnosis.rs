@@ -1,7 +1,7 @@
 //! Result of the diagnosis of one side.
 
 use crate::driven::side::Side;
-use crate::gap::findings::report::{Candidate, SmallestSeen};
+use crate::gap::report::{Candidate, SmallestSeen};
 use serde::Serialize;
 
 /// Overall verdict.

@@ -4,9 +4,9 @@ use crate::gap::best_fit::coordinate::{coordinates, infos};
 use crate::gap::best_fit::fit::{changes_near, effect_changes};
 use crate::gap::causes::additions::Calibration;
 use crate::gap::diagnose::Diagnosed;
-use crate::gap::findings::report::Verdict;
 use crate::gap::next_experiment::{SimulatedRig, simulated_steps};
 use crate::gap::preconditions::{GapError, Prepared};
+use crate::gap::report::Verdict;
 use crate::gap::request::RigRecording;
 use crate::gap::residuals::nuisance::{Nuisance, OFFSET_PREFIX, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
@@ -178,9 +178,6 @@ pub struct ForecastCheck {
 impl ForecastCheck {
     /// Compares a calibrated model, driven by the recorded inputs, with a recording to which it was not fitted. The compared values are block means,
     /// decorrelated within each step; their bands include the noise and the uncertainty of the model.
-    ///
-    /// # Errors
-    /// [`CalibratedModelError`].
     pub fn new(
         recorded: &RigRecording,
         effects: Vec<Arc<dyn Effect>>,
@@ -243,9 +240,6 @@ pub struct Expected {
 
 impl Found {
     /// Forecasts the ends of planned steps under the campaign's inputs. `planned`: a recording that has only steps.
-    ///
-    /// # Errors
-    /// [`CalibratedModelError`]; no steps if the nominal machine cannot settle at the first.
     pub fn forecast(
         &self,
         planned: RigRecording,

@@ -4,8 +4,8 @@ use crate::drift::without_drift;
 use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, infos, unknowns};
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::diagnose::Diagnosed;
-use crate::gap::findings::report::{Candidate, Verdict};
 use crate::gap::preconditions::GapError;
+use crate::gap::report::{Candidate, Verdict};
 use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
 use mapper_core::{
@@ -103,9 +103,6 @@ type Points<'a, T> = &'a dyn Fn(&T) -> Vec<IdentifiedPoint>;
 impl Diagnosed {
     /// Identifies the readings again without the causes found. `identify` takes a recording with the readings to identify, `points` reads the
     /// points of its result.
-    ///
-    /// # Errors
-    /// Those of `identify`, and [`GapError`] if the model cannot follow the recording with the causes.
     pub fn correct<T, E: From<GapError>>(
         &self,
         recording: &Recording,
@@ -324,9 +321,6 @@ pub(crate) struct Changes {
 
 impl Changes {
     /// The changes of a study's readings by the effects of a hypothesis.
-    ///
-    /// # Errors
-    /// [`PredictError`] if the model cannot follow.
     pub(crate) fn of(study: &Study, hypothesis: &Hypothesis) -> Result<Changes, PredictError> {
         let (start_s, end_s) = study.followed_s();
         let times_s = study.table.t_s[study.table.range(start_s, end_s)].to_vec();

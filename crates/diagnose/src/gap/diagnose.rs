@@ -2,16 +2,16 @@
 
 use crate::closure::discover::{Discovered, discover};
 use crate::drift::DriftReport;
+use crate::gap::baseline::Baseline;
 use crate::gap::best_fit::fit::{Adequacy, Fit};
 use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::{Posterior, rivals, smallest_seen, suspicions, weight};
-use crate::gap::findings::experiment::{Experiment, GapWarning};
-use crate::gap::findings::report::{Diagnosis, Gap, Next, Place, Verdict};
+use crate::gap::experiment::{Experiment, GapWarning};
 use crate::gap::gap_reduction::{Compared, beyond_prior, held_out_gap};
 use crate::gap::library_fits::LibraryFits;
-use crate::gap::model_error::baseline::Baseline;
 use crate::gap::next_experiment::{Suggested, next, sensor_near};
 use crate::gap::preconditions::{GapError, Prepared, another_machine, assumed, checked_study, is_of_sensors};
+use crate::gap::report::{Diagnosis, Gap, Next, Place, Verdict};
 use crate::gap::request::{BaselineRecording, ClosureSearch, GapRequest, RigRecording};
 use crate::gap::residuals::study::{Hypothesis, Prediction, Study, members};
 use crate::gap::residuals::whiten::Linearised;
@@ -60,9 +60,6 @@ const LIBRARY_FITTED: f64 = 0.88;
 const CLOSURE_END: f64 = 0.9;
 
 /// Diagnoses a recording: drift and zero, the effect library, closure terms, and the verdict with its consequences.
-///
-/// # Errors
-/// [`GapError`] if no diagnosis is possible.
 pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     let GapRequest { recording: rig, effects, experiments, calibration, progress, .. } = request;
     let in_library = |done: f64, what: &str| progress(DRIFT_SHARE + (LIBRARY_END - DRIFT_SHARE) * done, what);

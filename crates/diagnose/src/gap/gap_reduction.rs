@@ -2,7 +2,7 @@
 
 use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, Start, fit, misfit_of_steps, with_start_read};
 use crate::gap::best_fit::normal::{Selection, dot_over};
-use crate::gap::findings::report::{BeyondPrior, ChannelGap, Gap, PointGap};
+use crate::gap::report::{BeyondPrior, ChannelGap, Gap, PointGap};
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};

@@ -8,9 +8,9 @@ use crate::gap::causes::probabilities::{Posterior, posterior};
 use crate::gap::causes::select::{
     MAX_EVIDENCE_DEFICIT, Search, close, ranked, refit, search, search_onsets, supported,
 };
-use crate::gap::findings::report::{MAX_REFITTED, Place};
 use crate::gap::gap_reduction::Folds;
 use crate::gap::preconditions::GapError;
+use crate::gap::report::{MAX_REFITTED, Place};
 use crate::gap::residuals::study::{Study, members};
 use crate::gap::residuals::whiten::Linearised;
 

@@ -1,23 +1,25 @@
 //! Diagnosis of the gap between the model and a rig: its location, its cause, the gap reduction and the next step. See `docs/explanation/gap.md` for
 //! the method and its limits.
 
+pub(crate) mod baseline;
 pub(crate) mod best_fit;
 pub(crate) mod calibrated_model;
 pub(crate) mod causes;
 pub(crate) mod consequence;
 pub(crate) mod diagnose;
-pub(crate) mod findings;
+pub(crate) mod experiment;
 pub(crate) mod gap_reduction;
 pub(crate) mod library_fits;
-pub(crate) mod model_error;
 pub(crate) mod next_experiment;
 pub(crate) mod preconditions;
+pub(crate) mod report;
 pub(crate) mod request;
 pub(crate) mod residuals;
 pub(crate) mod scores;
+pub(crate) mod structure;
 pub(crate) mod verdict;
 
-pub use crate::gap::model_error::baseline::Baseline;
+pub use crate::gap::baseline::Baseline;
 pub use crate::gap::preconditions::GapError;
 pub use calibrated_model::{
     CalibratedModelError, Expected, ForecastCheck, Found, FoundEffect, FoundTolerance,
@@ -25,8 +27,8 @@ pub use calibrated_model::{
 pub use causes::additions::{Calibration, Origin};
 pub use consequence::{CorrectedMap, Correction, NotCorrected, PointCorrection};
 pub use diagnose::Diagnosed;
-pub use findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment, GapWarning, OffsetAtRest};
-pub use findings::report::{
+pub use experiment::{AllowedJump, AlsoChanged, AtRest, Experiment, GapWarning, OffsetAtRest};
+pub use report::{
     BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosis, Estimate, Gap, Kind, Next, PointGap,
     SmallestSeen, Suggestion, Verdict,
 };

@@ -5,7 +5,7 @@ use crate::drift::{CauseKind, DriftReport, DriftRequest, RecordedRun, without_dr
 use crate::gap::best_fit::fit::{Effort, adequacy, fit};
 use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::additions::Calibration;
-use crate::gap::findings::experiment::{GapWarning, OffsetAtRest};
+use crate::gap::experiment::{GapWarning, OffsetAtRest};
 use crate::gap::request::RigRecording;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{PredictError, Study};
@@ -83,9 +83,6 @@ const ANOTHER_MACHINE_RATIO: [(Channel, f64); 5] = [
 ];
 
 /// Rejects a recording that is far from the nominal prediction.
-///
-/// # Errors
-/// [`Problem`] with the channel that departs furthest.
 pub(crate) fn another_machine(study: &Study, predicted: &[f64]) -> Result<(), Problem> {
     let mut worst: Option<(f64, Channel, f64)> = None;
     for (channel, limit) in ANOTHER_MACHINE_RATIO {
@@ -177,9 +174,6 @@ pub enum GapError {
 }
 
 /// Checks a recording and prepares its study; returns warnings for tolerable defects.
-///
-/// # Errors
-/// [`GapError`] if the recording is unusable.
 pub(crate) fn checked_study(
     recording: &Recording,
     declared: Declared,
@@ -194,9 +188,6 @@ pub(crate) fn checked_study(
 }
 
 /// Checks a recording; returns warnings for tolerable defects.
-///
-/// # Errors
-/// [`Problem`] for others.
 pub(crate) fn usable(
     recording: &Recording,
     table: &Table,

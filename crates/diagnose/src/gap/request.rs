@@ -1,7 +1,7 @@
 //! What a diagnosis is given.
 
 use crate::gap::causes::additions::Calibration;
-use crate::gap::findings::experiment::{Experiment, GapWarning};
+use crate::gap::experiment::{Experiment, GapWarning};
 use mapper_core::{ModelTolerances, Recording, RigActuators, Soak};
 use mapper_identify::IdentifyConfig;
 use mapper_observe::declared::Declared;

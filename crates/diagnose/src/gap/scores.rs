@@ -73,9 +73,6 @@ pub struct EffectVisibility {
 
 impl EffectVisibility {
     /// Linearises the recording for candidate effects.
-    ///
-    /// # Errors
-    /// [`GapError`] if the recording cannot be diagnosed.
     pub fn new(recorded: RigRecording, effects: Vec<Arc<dyn Effect>>) -> Result<EffectVisibility, GapError> {
         // A calculated recording has all channels, and may be as short as its cases.
         let (recording, declared) = (&recorded.recording, recorded.declared());

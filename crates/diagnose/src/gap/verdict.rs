@@ -3,9 +3,9 @@
 use crate::drift::DriftReport;
 use crate::gap::causes::probabilities::Posterior;
 use crate::gap::causes::select::MIN_GAP_REDUCTION;
-use crate::gap::findings::report::{Gap, Verdict};
 use crate::gap::library_fits::LibraryFits;
 use crate::gap::preconditions::is_of_sensors;
+use crate::gap::report::{Gap, Verdict};
 
 /// How much of the gap the effect library explains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

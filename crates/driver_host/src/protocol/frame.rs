@@ -282,9 +282,6 @@ pub enum FrameError {
 }
 
 /// Reads the next frame; `None` if the stream ends between two frames. Allocates at most `limit_bytes`, whatever length is declared.
-///
-/// # Errors
-/// [`FrameError`]; the stream cannot be read any further then.
 pub fn read_frame(stream: &mut impl Read, limit_bytes: u32) -> Result<Option<Vec<u8>>, FrameError> {
     let mut length = Vec::with_capacity(4);
     stream.take(4).read_to_end(&mut length)?;
@@ -316,9 +313,6 @@ pub fn read_frame(stream: &mut impl Read, limit_bytes: u32) -> Result<Option<Vec
 }
 
 /// Writes one frame and flushes it.
-///
-/// # Errors
-/// [`FrameError::TooLarge`], and errors of the stream.
 pub fn write_frame(stream: &mut impl Write, body: &[u8], limit_bytes: u32) -> Result<(), FrameError> {
     let length = u32::try_from(body.len()).ok().filter(|length| *length <= limit_bytes);
     let Some(length) = length else {
@@ -343,9 +337,6 @@ pub fn encode(message: &Message, encoding: Encoding) -> Result<Vec<u8>, FrameErr
 }
 
 /// Decodes the message in the body of a frame. Unknown fields are ignored.
-///
-/// # Errors
-/// [`FrameError::Content`].
 pub fn decode(body: &[u8]) -> Result<Message, FrameError> {
     match Encoding::of(body) {
         Encoding::Json => {

@@ -102,9 +102,6 @@ fn quality_name(quality: Quality) -> String {
 }
 
 /// Converts samples of a driver to a batch. Channels that are not described are ignored.
-///
-/// # Errors
-/// [`InvalidData`] if columns differ in length, or times do not increase.
 pub fn batch(samples: Samples, described: &[Channel]) -> Result<SampleBatch, InvalidData> {
     let count = samples.t_s.len();
     let check_length = |name: &str, length: usize| {

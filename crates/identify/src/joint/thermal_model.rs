@@ -15,7 +15,7 @@ use mapper_core::unit_factors::M_PER_MM;
 use mapper_core::{
     ConvectionLaw, CorrelatedPair, EstimateUncertainty, IdentifiedHousing, Origin, SharedValue, ThermalModel,
 };
-use mapper_inference::interval::is_identified;
+use mapper_inference::posterior::is_identified;
 
 /// Step of the derivative of a transformed parameter. Bound: between rounding and curvature for parameters of order 1.
 const TRANSFORM_STEP: f64 = 1e-6;

@@ -9,7 +9,7 @@ use crate::reading_checks::ends::{Ends, FailedCheck};
 use mapper_core::{Channel, Scaled, Swapped, Warning, check_running};
 use mapper_numerics::statistics::median;
 use mapper_physics::gas::air::Air;
-use mapper_physics::machine::state::rad_s_of_rpm;
+use mapper_physics::machine::params::rad_s_of_rpm;
 
 /// Isentropic rise above which heat no longer hides the work, K. Bound: heat changes T2 by less than half of it.
 const MIN_RISE_K: f64 = 20.0;

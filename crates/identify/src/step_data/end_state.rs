@@ -7,7 +7,7 @@ use mapper_core::{
     Channel, Recording, Series, SettleBands, StepMarker, Warning, Window, WindowRule, is_reading,
 };
 use mapper_numerics::statistics::{mean, median, robust_sigma};
-use mapper_observe::redundant_sensors::fuse::SPIKE_SIGMAS;
+use mapper_observe::fuse::SPIKE_SIGMAS;
 use mapper_physics::operating_point::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 
 /// The operating point at the end of a step.

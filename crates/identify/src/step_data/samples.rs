@@ -7,7 +7,7 @@ use mapper_core::{
     repeats,
 };
 use mapper_numerics::statistics::{MIN_VALUES, mean, median_of_sorted, robust_sigma};
-use mapper_observe::redundant_sensors::fuse::SPIKE_SIGMAS;
+use mapper_observe::fuse::SPIKE_SIGMAS;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 use mapper_physics::operating_point::forecast::ForecastRow;

@@ -1,9 +1,9 @@
 //! The fitted map for its users: values and standard errors at any place, and a table with marks of extrapolation.
 
 use crate::map_fit::MapFitError;
-use crate::map_fit::least_squares::observations::Observations;
-use crate::map_fit::least_squares::problem::PARAMETER_STEP;
-use crate::map_fit::least_squares::solution::Solution;
+use crate::map_fit::observations::Observations;
+use crate::map_fit::problem::PARAMETER_STEP;
+use crate::map_fit::solution::Solution;
 use crate::map_fit::speed_lines::{
     ANGLE_RANGE_RAD, DIFFERENCE_STEP_RAD, FlowFrame, LineShape, MIN_ANGLE_RAD, MIN_SQUARE_SLOPE, PARAMETERS,
     Parameters, Scales, SpeedSpline, WORK, count_crossings, nearest, normal,

@@ -2,8 +2,10 @@
 
 mod error;
 mod fitted_surface;
-mod least_squares;
+pub(crate) mod observations;
 mod prediction_errors;
+pub(crate) mod problem;
+pub(crate) mod solution;
 mod speed_lines;
 
 pub use error::MapFitError;
@@ -12,9 +14,9 @@ pub use fitted_surface::{MapFit, MapFitOptions, NearestPlace};
 pub use prediction_errors::leave_out;
 
 use fitted_surface::table;
-use least_squares::observations::Observations;
-use least_squares::solution::{Solution, solve};
 use mapper_core::{CompressorMap, FittedLine, FittedMap};
+use observations::Observations;
+use solution::{Solution, solve};
 use speed_lines::{End, count_crossings};
 use std::collections::BTreeMap;
 
@@ -33,9 +35,6 @@ impl MapFit {
 }
 
 /// Fits a map and puts the table into it ([`CompressorMap::fitted`]).
-///
-/// # Errors
-/// [`MapFitError`].
 pub fn fit_map(mut map: CompressorMap, options: &MapFitOptions) -> Result<CompressorMap, MapFitError> {
     let fit = MapFit::new(&map)?;
     map.fitted = Some(fit.table(options)?);
@@ -49,9 +48,6 @@ impl MapFit {
     /// Fits all lines of a map, every point at its own corrected speed.
     ///
     /// If lines cross, the fit is made again with stiffer parameters over speed.
-    ///
-    /// # Errors
-    /// [`MapFitError`] if there are too few or too many points, or they do not determine the fit.
     pub fn new(map: &CompressorMap) -> Result<Self, MapFitError> {
         Ok(MapFit::of(Observations::of(map)?, None)?.widened(&[End::Slow, End::Fast]))
     }

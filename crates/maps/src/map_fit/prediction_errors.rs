@@ -6,7 +6,7 @@
 //! of that line. It is never decreased: one line does not justify smaller errors.
 
 use crate::map_fit::fitted_surface::MapFit;
-use crate::map_fit::least_squares::observations::Observation;
+use crate::map_fit::observations::Observation;
 use crate::map_fit::speed_lines::{End, EndWidenings, Widening};
 use mapper_core::LeftOutLine;
 use mapper_numerics::parallel;

@@ -131,9 +131,6 @@ fn set_column(description: &mut MapDescription, quantity: &'static str, text: &s
 }
 
 /// Adds a statement to a description.
-///
-/// # Errors
-/// [`KeyError`] for an unknown key and for a value that is not valid for it.
 pub fn set_key(description: &mut MapDescription, key: &str, value: &str) -> Result<(), KeyError> {
     keys::set_key(&KEYS, description, key, value.trim())
 }
@@ -149,9 +146,6 @@ pub enum DescriptionError {
 }
 
 /// Reads the file of a map description.
-///
-/// # Errors
-/// [`DescriptionError`] with all mistakes of the file.
 pub fn read_description(path: &Path) -> Result<MapDescription, DescriptionError> {
     let mistakes = |findings| DescriptionError::Mistakes(Box::new(findings));
     let text = mapper_yaml::open(&DOCUMENT, path, MAX_BYTES)

@@ -113,9 +113,6 @@ pub(crate) fn design_of(code: &str) -> MapDesign {
 }
 
 /// The unit of flow, kg/s: as described, or as the file gives it.
-///
-/// # Errors
-/// [`ImportError::Description`] for an unknown unit.
 pub(crate) fn flow_unit(code: &str, description: &MapDescription) -> Result<Option<f64>, ImportError> {
     let Some(column) = description.columns.iter().find(|column| column.quantity == "flow") else {
         return Ok(flow_unit_in(code));

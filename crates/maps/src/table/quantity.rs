@@ -266,9 +266,6 @@ pub(crate) fn is_end_title(text: &str) -> bool {
 }
 
 /// A reference state from a name (`SAE`, `Garrett`, `BorgWarner`) or `"T, P"` with units, as in `298 K, 100 kPa`.
-///
-/// # Errors
-/// [`ImportError::Reference`].
 pub fn parse_reference(text: &str) -> Result<ReferenceState, ImportError> {
     let wrong = || ImportError::Reference { text: text.chars().take(60).collect() };
     if let Some(state) = ReferenceState::named(text) {
@@ -293,9 +290,6 @@ pub fn reference_in_comment(comment: &str) -> Option<ReferenceState> {
 }
 
 /// The reference state of the corrected quantities, from the file and the user.
-///
-/// # Errors
-/// [`ImportError::NoReference`] and [`ImportError::ReferenceConflict`].
 pub fn resolve_reference(
     found: Option<ReferenceState>,
     given: Option<ReferenceState>,

@@ -25,17 +25,11 @@ use mapper_table::header_unit;
 use mapper_yaml::units::Kind;
 
 /// The map of a text.
-///
-/// # Errors
-/// [`ImportError`] with the line of the file.
 pub fn read_text(text: &str, description: &MapDescription) -> Result<ImportedMap, ImportError> {
     read(&Grid::of_text(text)?, description)
 }
 
 /// The map of a text in any layout: tables of NPSS or Modelica, arrays of a script, or a table of points.
-///
-/// # Errors
-/// [`ImportError`] with the line of the file.
 pub fn read_any_text(text: &str, description: &MapDescription) -> Result<ImportedMap, ImportError> {
     if text.contains(NPSS_TABLE) {
         read_nested(text, description)
@@ -51,9 +45,6 @@ pub fn read_any_text(text: &str, description: &MapDescription) -> Result<Importe
 }
 
 /// The map of a file of text.
-///
-/// # Errors
-/// As [`read_any_text`], and [`ImportError::NotText`].
 pub fn read_any_bytes(bytes: &[u8], description: &MapDescription) -> Result<ImportedMap, ImportError> {
     read_any_text(&text_of(bytes)?, description)
 }
@@ -70,9 +61,6 @@ fn has_arrays(text: &str) -> bool {
 }
 
 /// The map of a workbook: of its first sheet with a table of numbers.
-///
-/// # Errors
-/// [`ImportError`] with the row of the sheet.
 pub fn read_workbook(bytes: &[u8], description: &MapDescription) -> Result<ImportedMap, ImportError> {
     read(&grid_of_workbook(bytes, description.sheet.as_deref())?, description)
 }

@@ -19,17 +19,11 @@ use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::apparent_efficiency;
 
 /// The turbine map of a text.
-///
-/// # Errors
-/// [`ImportError`] with the line of the file.
 pub fn read_turbine_text(text: &str, description: &MapDescription) -> Result<ImportedTurbine, ImportError> {
     read(&Grid::of_text(text)?, description)
 }
 
 /// The turbine map of a workbook.
-///
-/// # Errors
-/// [`ImportError`] with the row of the sheet.
 pub fn read_turbine_workbook(
     bytes: &[u8],
     description: &MapDescription,

@@ -44,9 +44,6 @@ pub struct Row {
 
 impl Row {
     /// Refuses values that are impossible for a compressor.
-    ///
-    /// # Errors
-    /// [`ImportError`] with the impossible value.
     pub fn check(&self) -> Result<(), ImportError> {
         let positive = "a number above 0";
         for (quantity, value, good, needed) in [
@@ -227,9 +224,6 @@ pub fn shift_remark(map: &CompressorMap) -> Option<ImportRemark> {
 }
 
 /// Refuses a file with too many rows.
-///
-/// # Errors
-/// [`ImportError::TooMany`].
 pub fn check_point_count(count: usize, at: usize) -> Result<(), ImportError> {
     if count >= MAX_POINTS {
         return Err(ImportError::TooMany { line: at, limit: MAX_POINTS });

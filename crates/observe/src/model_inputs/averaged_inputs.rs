@@ -57,9 +57,6 @@ impl Inputs for AveragedInputs {
 impl AveragedInputs {
     /// The inputs of a recording during `steps` (rising in time, each with the commands it holds). `nominal` replaces channels that are not
     /// recorded.
-    ///
-    /// # Errors
-    /// [`InputsError`] if steps do not rise.
     pub fn read(
         recording: &Recording,
         nominal: &BoundaryConditions,

@@ -104,9 +104,6 @@ impl TabulatedMap {
     ///
     /// Points on the surge side of a line's highest pressure ratio are skipped, because there flow is not a function of
     /// pressure ratio.
-    ///
-    /// # Errors
-    /// [`MapError`] with the wrong row or line.
     pub fn new(rows: &[MapRow], reference: ReferenceState) -> Result<Self, MapError> {
         for (index, row) in rows.iter().enumerate() {
             let positive = "finite and above 0";

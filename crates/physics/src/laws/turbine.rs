@@ -3,8 +3,7 @@
 use crate::gas::air;
 use crate::gas::air::{Air, GAS_CONSTANT_J_KGK, HEAT_CAPACITY_RATIO as G, power};
 use crate::laws::convection;
-use crate::machine::params::{BoundaryConditions, TurbineParams};
-use crate::machine::state::rad_s_of_rpm;
+use crate::machine::params::{BoundaryConditions, TurbineParams, rad_s_of_rpm};
 
 /// Friction power, W, from the friction coefficient c in W s^2/rad^2 and the shaft speed in rad/s.
 pub fn friction_power_w(bearing_friction_w_s2: f64, shaft_speed_rad_s: f64) -> f64 {

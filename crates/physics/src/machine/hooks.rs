@@ -3,8 +3,7 @@
 //! [Parameters](crate::machine::params::Params) change the model's numbers; hooks make all other changes. Each receives the model's value
 //! and returns the value to use.
 
-use crate::machine::params::BoundaryConditions;
-use crate::machine::state::{MAX_EXTRA, State};
+use crate::machine::params::{BoundaryConditions, MAX_EXTRA, State};
 use mapper_core::Channel;
 use std::sync::Arc;
 
@@ -171,9 +170,6 @@ pub struct TooManyExtraStates {
 
 impl HookList {
     /// Adds hooks after the existing ones, and passes them the values that those returned.
-    ///
-    /// # Errors
-    /// [`TooManyExtraStates`]; the list is then unchanged.
     pub fn push(&mut self, hooks: Arc<dyn Hooks>) -> Result<(), TooManyExtraStates> {
         let extra_states = hooks.extra_states();
         let needed = self.extra_states.saturating_add(extra_states);

@@ -2,4 +2,3 @@
 
 pub mod hooks;
 pub mod params;
-pub mod state;

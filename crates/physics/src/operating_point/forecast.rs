@@ -63,9 +63,6 @@ pub struct StepForecast {
 }
 
 /// The machine after `duration_s` at `boundary`.
-///
-/// # Errors
-/// [`SimulationError`] if the simulation fails.
 pub fn hold(
     model: &Model,
     state: State,
@@ -79,9 +76,6 @@ pub fn hold(
 
 /// The machine after `warm_up_s` at its first point, from housings at ambient temperature; `first` is the
 /// point's steady state.
-///
-/// # Errors
-/// [`SimulationError`] if the simulation fails.
 pub fn warm_up_state(
     model: &Model,
     first: State,
@@ -93,9 +87,6 @@ pub fn warm_up_state(
 }
 
 /// The step of `dwell_s` from `state` under `inputs`, which move until `arrival_s`, and the time of its shaft inside the speeds to `avoid`.
-///
-/// # Errors
-/// [`SimulationError`] if the simulation fails.
 pub fn forecast_step(
     model: &Model,
     state: State,

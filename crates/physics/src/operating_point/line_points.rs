@@ -86,9 +86,6 @@ impl LineError {
 
 /// The points of a line from choke to surge. `boundary` has T1 and P1 and the other boundary conditions; its P3 and
 /// valve are not used.
-///
-/// # Errors
-/// [`LineError`] if the line has no such points.
 pub fn line_points(
     model: &Model,
     boundary: &BoundaryConditions,

@@ -80,9 +80,6 @@ pub struct TransitionForecast {
 
 /// Forecasts a step of `dwell_s` from `state`, near the steady state `from`, to `target`: on the fastest ramps that leave no limit, or on those that
 /// leave it least.
-///
-/// # Errors
-/// [`SimulationError`] if a simulation fails.
 pub fn forecast_transition(
     model: &Model,
     state: State,

@@ -15,9 +15,6 @@ pub trait EffectKind: std::fmt::Debug + Send + Sync + Sized + 'static {
     fn info() -> EffectInfo;
 
     /// Takes each parameter by its name.
-    ///
-    /// # Errors
-    /// [`EffectError::NoParameter`] if a name is missing.
     fn from_values(values: &NamedValues<'_>) -> Result<Self, EffectError>;
 
     /// Adds the effect to a rig. Neutral values change nothing.
@@ -146,9 +143,6 @@ impl Rig {
     }
 
     /// Adds something that is not a parameter.
-    ///
-    /// # Errors
-    /// [`TooManyExtraStates`].
     pub fn hook(&mut self, hooks: impl Hooks + 'static) -> Result<(), TooManyExtraStates> {
         self.model.hooks.push(Arc::new(hooks))
     }
@@ -277,9 +271,6 @@ impl<'a> NamedValues<'a> {
     }
 
     /// The value of a parameter, in its unit.
-    ///
-    /// # Errors
-    /// [`EffectError::NoParameter`].
     pub fn get(&self, name: &str) -> Result<f64, EffectError> {
         self.iter().find(|(parameter, _)| parameter.name == name).map(|(_, value)| value).ok_or_else(|| {
             EffectError::NoParameter {

@@ -6,8 +6,7 @@
 //! does not limit it.
 
 use crate::compressor_map::closed_form_map::CharacteristicPoint;
-use crate::machine::params::BoundaryConditions;
-use crate::machine::state::MAX_STATES;
+use crate::machine::params::{BoundaryConditions, MAX_STATES};
 use crate::simulation::model::{Model, Outputs, PreparedModel, State};
 use crate::simulation::rosenbrock::{Integrator, OdeSystem, Step};
 use crate::simulation::simulate::tolerances;
@@ -88,9 +87,6 @@ pub struct DriveError {
 
 /// Drives `model` from `start` over the grid. `on_sample` receives the index of each of `times_s` (rising, within the grid)
 /// with the model there.
-///
-/// # Errors
-/// [`DriveError`] if the boundary conditions are not valid or a step gives no number.
 pub fn drive(
     model: &Model,
     inputs: &impl Inputs,
@@ -139,9 +135,6 @@ pub(crate) fn drive_steps<I: Inputs>(
 }
 
 /// The steady state of `model` under constant boundary conditions, from a first guess: driven for ten hours.
-///
-/// # Errors
-/// [`DriveError`] if it does not reach a steady state.
 pub fn settle(model: &Model, boundary: &BoundaryConditions, guess: State) -> Result<State, DriveError> {
     // Growing steps: one far longer than every time constant of an L-stable method ends at the steady state. If the guess is
     // beyond the surge line, the first step is too long for the outlet volume: start again from its own milliseconds.

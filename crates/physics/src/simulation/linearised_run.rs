@@ -7,7 +7,7 @@
 //! that the method also follows differences that are not small; its error is some per mille of a difference, a few per cent next to the
 //! surge line.
 
-use crate::machine::state::MAX_STATES;
+use crate::machine::params::MAX_STATES;
 use crate::simulation::driven::{
     DriveError, FrozenGrid, GRID_TOLERANCE, drive_steps, is_physical, last_of_step_s,
 };

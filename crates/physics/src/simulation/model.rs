@@ -5,10 +5,8 @@ use crate::gas::air;
 use crate::laws::turbine::{self, TurbineInlet, TurbineState, friction_power_w};
 use crate::laws::{compression, convection, housing, thermocouple};
 use crate::machine::hooks::{HookList, Hooks, Site};
-pub use crate::machine::params::BoundaryError;
-use crate::machine::params::{BoundaryConditions, Params};
-use crate::machine::state::{MAX_EXTRA, MAX_STATES};
-pub use crate::machine::state::{State, rad_s_of_rpm};
+use crate::machine::params::{BoundaryConditions, MAX_EXTRA, MAX_STATES, Params};
+pub use crate::machine::params::{BoundaryError, State, rad_s_of_rpm};
 use std::sync::Arc;
 
 /// Flow below which the gas path is not evaluated (it divides by the flow), kg/s.

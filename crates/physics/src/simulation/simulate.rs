@@ -1,7 +1,6 @@
 //! Integrates the model; returns samples at given times and events when they occur.
 
-use crate::machine::params::{BoundaryConditions, Params};
-use crate::machine::state::MAX_STATES;
+use crate::machine::params::{BoundaryConditions, MAX_STATES, Params};
 use crate::simulation::model::{BoundaryError, Model, Outputs, PreparedModel, State};
 use crate::simulation::rosenbrock::{IntegrationError, Integrator, OdeSystem, Step, Tolerances};
 use crate::simulation::steady::Inputs;
@@ -155,9 +154,6 @@ impl Simulator {
 
     /// Runs to `end_s`. Calls `on_sample` with time, state and outputs at each of `sample_times_s` (rising, within
     /// the interval; the interval's start is allowed), and `on_event` at each crossing, in order of time.
-    ///
-    /// # Errors
-    /// [`SimulationError`] if the inputs are not valid or the tolerance cannot be met.
     pub fn run_to(
         &mut self,
         end_s: f64,

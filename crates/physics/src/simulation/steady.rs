@@ -1,7 +1,6 @@
 //! Steady states, and the inputs of a simulation.
 
-use crate::machine::params::BoundaryConditions;
-use crate::machine::state::MAX_EXTRA;
+use crate::machine::params::{BoundaryConditions, MAX_EXTRA};
 use crate::simulation::model::{BoundaryError, Model, Outputs, State, rad_s_of_rpm};
 use mapper_numerics::root::root_between;
 use nalgebra::{SMatrix, SVector};
@@ -58,9 +57,6 @@ const HEAT_TOLERANCE_W: f64 = 1e-9;
 /// Finds the steady state at `speed_rpm` under `boundary`. Ignores `p3_pa` and computes it.
 ///
 /// Nested solution: outlet pressure from the flow balance, P3 from the power balance, temperatures by Newton's method.
-///
-/// # Errors
-/// [`SteadyError`] with the balance that cannot be met.
 pub fn hold_speed(
     model: &Model,
     speed_rpm: f64,
@@ -248,9 +244,6 @@ const SETTLE_SPEEDS_RPM: (f64, f64) = (5_000.0, 400_000.0);
 /// Finds the steady state that the machine reaches from low speed under `boundary`, `p3_pa` included.
 ///
 /// It is the lowest speed that needs this P3, found on a geometric grid of 5 % and refined to rounding.
-///
-/// # Errors
-/// [`SteadyError`] if the boundary conditions are not valid or no speed from 5 to 400 krpm balances them.
 pub fn settle_under(model: &Model, boundary: &BoundaryConditions) -> Result<SteadyState, SteadyError> {
     boundary.check()?;
     let excess_pa = |speed_rpm: f64| {

@@ -7,7 +7,7 @@
 use crate::logs::finding::STANDARD_ATMOSPHERE_PA;
 use crate::logs::{LogOptions, OPTION_KEYS};
 use crate::mcap::ChannelDefinition;
-use crate::writing::topics::ELEMENTS_TOPIC;
+use crate::topics::ELEMENTS_TOPIC;
 use crate::{ReadWarning, RecordError};
 use mapper_core::{
     CHANNELS, Channel, DeclaredUncertainty, Element, Group, MAX_ELEMENTS, NAMED_REFERENCES, NoiseColour,

@@ -2,7 +2,7 @@
 
 use crate::channel_mapping::channel_map::{SCHEMA, UNKNOWN_WORD};
 use crate::logs::{LogOptions, OPTION_KEYS};
-use crate::writing::topics::TRUTH_PREFIX;
+use crate::topics::TRUTH_PREFIX;
 use crate::{
     AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, RecordError, WindowLimits,
 };

@@ -28,9 +28,6 @@ pub trait Log {
     fn layout(&self) -> &Layout;
 
     /// Passes the rows of the requested columns (indices of [`Layout::columns`]) to `sink`, each group in the order of the file.
-    ///
-    /// # Errors
-    /// [`LogError`] if the file cannot be read to its end; rows before the fault were passed on.
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError>;
 }
 
@@ -62,9 +59,6 @@ impl LogFormats {
     }
 
     /// Opens a log.
-    ///
-    /// # Errors
-    /// [`LogError`] if the file cannot be read, is of no known format, or contains no usable data.
     pub fn open(
         self,
         file: &LogFile,
@@ -260,9 +254,6 @@ impl LogFile {
     }
 
     /// The bytes from the start.
-    ///
-    /// # Errors
-    /// [`LogError::Read`] if the file cannot be opened.
     pub fn open(&self) -> Result<Box<dyn ReadSeek>, LogError> {
         match &self.bytes {
             Some(bytes) => Ok(Box::new(Cursor::new(bytes.clone()))),
@@ -279,9 +270,6 @@ impl LogFile {
     }
 
     /// Its size, bytes.
-    ///
-    /// # Errors
-    /// [`LogError::Read`] if the file cannot be found.
     pub fn size_bytes(&self) -> Result<u64, LogError> {
         match &self.bytes {
             Some(bytes) => Ok(bytes.len() as u64),
@@ -290,9 +278,6 @@ impl LogFile {
     }
 
     /// At most the first `count` bytes.
-    ///
-    /// # Errors
-    /// [`LogError::Read`] if the file cannot be read.
     pub fn head(&self, count: usize) -> Result<Vec<u8>, LogError> {
         let mut head = Vec::new();
         let limit = u64::try_from(count).unwrap_or(u64::MAX);

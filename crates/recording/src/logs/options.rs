@@ -147,9 +147,6 @@ fn date_order(text: &str) -> Option<DateOrder> {
 
 impl LogOptions {
     /// Sets one key.
-    ///
-    /// # Errors
-    /// [`KeyError`] for an unknown key and for a value that is not valid for it.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), KeyError> {
         set_key(&OPTION_KEYS, self, key, value)
     }
@@ -189,9 +186,6 @@ impl LogOptions {
     }
 
     /// Checks that no key that a format does not use is set.
-    ///
-    /// # Errors
-    /// As [`LogOptions::allow_only`].
     pub fn refuse_keys(&self, unused: &[&str]) -> Result<(), String> {
         let used: Vec<&str> =
             OPTION_KEYS.iter().map(|key| key.name).filter(|key| !unused.contains(key)).collect();

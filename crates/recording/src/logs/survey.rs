@@ -155,9 +155,6 @@ impl GroupSurvey {
 }
 
 /// Reads a log and surveys every column.
-///
-/// # Errors
-/// [`LogError`] if the log cannot be read to its end.
 pub fn survey(log: &mut dyn Log) -> Result<Survey, LogError> {
     let layout = log.layout().clone();
     let mut survey = Survey {

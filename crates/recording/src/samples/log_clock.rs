@@ -59,9 +59,6 @@ pub(crate) type TakeRow<'a> = dyn FnMut(f64, &[f64]) + 'a;
 
 impl LogClock {
     /// Takes the next row.
-    ///
-    /// # Errors
-    /// [`Restart`] if the clock starts again.
     pub(crate) fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) -> Result<(), Restart> {
         self.rows += 1;
         if !t_s.is_finite() || t_s.abs() >= MAX_TIME_S {

@@ -4,7 +4,7 @@ use crate::channel_mapping::channel_map::{MappedQuantity, MappedTopic, map_topic
 use crate::mcap::{ChannelDefinition, FieldValue, Sink, read_fields};
 use crate::samples::series_builder::SeriesBuilder;
 use crate::steps::StepMessage;
-use crate::writing::topics::{
+use crate::topics::{
     CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, OriginMessage, PLAN_NAME, PROVENANCE_TOPIC,
     START_KEY, STEP_TOPIC, read_origins,
 };

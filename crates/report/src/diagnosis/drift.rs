@@ -113,9 +113,6 @@ fn group_table(group: &RepeatGroup) -> Table {
 
 /// Corrected points as CSV, one row each under the names of [`CorrectedPoint`](mapper_diagnose::drift::CorrectedPoint). Each drift has a column
 /// for its correction, `correction_` and its cause. A missing number is empty.
-///
-/// # Errors
-/// None in practice: an error of the writer, and writing to memory never fails.
 pub fn corrected_csv(report: &DriftReport) -> std::io::Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let heads = [

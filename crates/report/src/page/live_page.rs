@@ -29,9 +29,6 @@ pub struct Planned {
 }
 
 /// The page, without any data of a run: authorised clients receive those later.
-///
-/// # Errors
-/// None in practice: JSON of numbers and strings can always be written.
 pub fn live_page() -> Result<String, serde_json::Error> {
     let empty = json!({
         "units": {"flow": "", "speed": ""}, "map": DrawnMap::default(),

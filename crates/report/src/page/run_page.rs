@@ -108,9 +108,6 @@ fn json_in_html(data: &impl Serialize) -> Result<String, serde_json::Error> {
 }
 
 /// The page. `machine` and `recording` are names for its title.
-///
-/// # Errors
-/// None in practice: JSON of numbers and strings can always be written.
 pub fn gap_page(machine: &str, recording: &str, diagnosed: &Diagnosed) -> Result<String, serde_json::Error> {
     let title = format!("Gap between {machine} and its nominal model");
     let body = html! {
@@ -138,9 +135,6 @@ struct DrawnOther {
 
 impl RunReport<'_> {
     /// The report as a page: one HTML file.
-    ///
-    /// # Errors
-    /// None in practice: JSON of numbers and strings can always be written.
     pub fn page(&self) -> Result<String, serde_json::Error> {
         let display = self.display();
         let drawn = PageData {

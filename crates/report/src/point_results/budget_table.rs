@@ -5,9 +5,6 @@ use mapper_core::{PointBudgets, UncertaintyBudget, step_number};
 
 /// The budgets as a file: one row for each source of each number of each point. An empty cell of degrees of freedom means that the uncertainty
 /// is known exactly.
-///
-/// # Errors
-/// None in practice: it is written to memory.
 pub fn budget_csv(budgets: &[PointBudgets]) -> std::io::Result<Vec<u8>> {
     let number = |value: f64| format!("{value:e}");
     let freedom = |value: Option<f64>| value.map(|value| format!("{value:.1}")).unwrap_or_default();

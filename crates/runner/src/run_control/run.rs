@@ -96,9 +96,6 @@ pub(crate) struct Run<'a, 'p> {
 
 impl Runner<'_> {
     /// Runs all steps from arming to disarming, with guards but without further protection.
-    ///
-    /// # Errors
-    /// As [`Runner::run_under`].
     pub fn run(self) -> Result<RunEnding, RunError> {
         self.run_under(&Protection::default())
     }
@@ -106,9 +103,6 @@ impl Runner<'_> {
     /// Runs all steps from arming to disarming.
     ///
     /// When this returns, the rig has been commanded to its safe state and disarmed, even after a panic.
-    ///
-    /// # Errors
-    /// [`RunError`] if the rig or an observer failed.
     pub fn run_under(mut self, protection: &Protection<'_>) -> Result<RunEnding, RunError> {
         let answered = self.arm(protection)?;
         let sample_s = 1.0 / self.backend.describe().sample_rate_hz;

@@ -41,9 +41,6 @@ pub struct Gap {
 
 impl Gap {
     /// Machine-readable output: diagnosis, identified effects, drift and zero.
-    ///
-    /// # Errors
-    /// [`SessionError::Json`]: none in practice.
     pub fn json(&self) -> Result<Value, SessionError> {
         let Diagnosed { diagnosis, drift, zero, .. } = &self.diagnosed;
         let versioned = Versioned { format_version: DIAGNOSIS_FORMAT, content: diagnosis };
@@ -65,9 +62,6 @@ impl Gap {
     }
 
     /// The page of the diagnosis. `recording`: its name for the title.
-    ///
-    /// # Errors
-    /// [`SessionError::Json`]: none in practice.
     pub fn page(&self, machine: &str, recording: &str) -> Result<String, SessionError> {
         Ok(gap_page(machine, recording, &self.diagnosed)?)
     }
@@ -114,9 +108,6 @@ impl Session<'_> {
     }
 
     /// Compares the machine found by a diagnosis with an independent recording. Nothing is fitted.
-    ///
-    /// # Errors
-    /// As [`Session::diagnose_gap`], and [`SessionError::CalibratedModel`] if diagnosis and recording do not belong together.
     pub fn check_forecast(
         &self,
         recorded: &Recorded,
@@ -131,9 +122,6 @@ impl Session<'_> {
     }
 
     /// Expected readings of the diagnosed machine at the end of each planned step of a campaign.
-    ///
-    /// # Errors
-    /// [`SessionError`] if no plan can be made, or the calibrated model cannot follow it.
     pub fn forecast_calibrated_model(
         &self,
         campaign: &Campaign,
@@ -209,9 +197,6 @@ pub struct GapCorrection {
 impl Session<'_> {
     /// Diagnoses a recording and identifies it again without the causes found. With `directory`, the results are written there as those of an
     /// identification.
-    ///
-    /// # Errors
-    /// As [`Session::diagnose_gap`], [`Session::identify`] and [`Session::identify_into`].
     pub fn correct_gap(
         &self,
         recorded: &Recorded,

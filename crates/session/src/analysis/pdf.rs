@@ -36,9 +36,6 @@ pub enum PrintError {
 
 /// The PDF of a page. `directory` is for temporary files of the browser, which as a snap package has access only to the user's own
 /// directories.
-///
-/// # Errors
-/// `PrintError`.
 pub fn page_as_pdf(page: &str, directory: &Path) -> Result<Vec<u8>, PrintError> {
     let browser = BROWSERS.into_iter().find(|name| is_on_path(name)).ok_or(PrintError::NoBrowser)?;
     let failed = |source| PrintError::System(browser, source);

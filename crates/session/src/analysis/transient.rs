@@ -61,9 +61,6 @@ impl Session<'_> {
 }
 
 /// Writes text, JSON and pictures of the result to a directory. Creates it if missing and returns the files.
-///
-/// # Errors
-/// As [`write_file`](crate::write_file).
 pub fn write_transient(
     diagnosis: &Diagnosis,
     machine: &str,

@@ -360,9 +360,6 @@ pub(crate) struct FirstMap {
 
 impl FirstMap {
     /// The map of a request.
-    ///
-    /// # Errors
-    /// [`FirstMapError`] if the machine's own map cannot be read, or has no line in the speed range.
     pub(crate) fn of(registry: &Registry, request: &FirstCampaignRequest) -> Result<Self, SessionError> {
         let (wheel_m, (low_m, high_m)) = (request.wheel_diameter_m, USUAL_WHEEL_DIAMETERS_M);
         if !(low_m..=high_m).contains(&wheel_m) {

@@ -27,9 +27,6 @@ impl Registry {
     }
 
     /// The same, with the columns and what the reader assumed.
-    ///
-    /// # Errors
-    /// As [`Registry::read_map`].
     pub fn inspect_map(
         &self,
         path: &Path,
@@ -40,9 +37,6 @@ impl Registry {
     }
 
     /// Reads the map of a turbine.
-    ///
-    /// # Errors
-    /// As [`Registry::read_map`].
     pub fn inspect_turbine(
         &self,
         path: &Path,
@@ -103,9 +97,6 @@ impl Registry {
     }
 
     /// Finds the writable map format of this name.
-    ///
-    /// # Errors
-    /// [`SessionError::UnknownFormat`] if there is none.
     pub fn written_format(&self, name: &str) -> Result<&'static MapFormat, SessionError> {
         self.formats.written().find(|format| format.name == name).ok_or_else(|| SessionError::UnknownFormat {
             name: name.to_owned(),
@@ -190,9 +181,6 @@ fn line_files(directory: &Path) -> Result<Vec<(String, Vec<u8>)>, Error> {
 }
 
 /// What the user states about a map file: a description, and statements that count before it.
-///
-/// # Errors
-/// [`MapWorkError::Description`] and [`MapWorkError::Key`].
 pub fn map_description<'a>(
     file: Option<&Path>,
     statements: impl IntoIterator<Item = (&'a str, &'a str)>,
@@ -219,9 +207,6 @@ pub fn write_map(
 }
 
 /// Writes a map to a file. A format that tabulates the whole map gets a fitted one. Returns the written map and whether it was fitted here.
-///
-/// # Errors
-/// As [`write_map`], and [`SessionError::Fit`] if the map cannot be fitted.
 pub fn write_map_fitted_if_needed(
     path: &Path,
     format: &MapFormat,

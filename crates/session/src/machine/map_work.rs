@@ -59,9 +59,6 @@ pub(crate) fn warnings(path: &Path, remarks: &[ImportRemark]) -> Vec<String> {
 
 impl Registry {
     /// Reads the map of a compressor or of a turbine.
-    ///
-    /// # Errors
-    /// As [`Registry::inspect_map`].
     pub fn read_map_file(
         &self,
         path: &Path,
@@ -77,9 +74,6 @@ impl Registry {
     }
 
     /// Shows how a map file is read. `description` is a new file for the map description.
-    ///
-    /// # Errors
-    /// As [`Registry::read_map_file`], and those of writing.
     pub fn inspect_map_file(
         &self,
         path: &Path,
@@ -132,9 +126,6 @@ impl Registry {
     }
 
     /// Fits a map, and writes it to `out`.
-    ///
-    /// # Errors
-    /// As [`Registry::read_map_file`], [`MapWorkError`], and those of writing.
     pub fn fit_map_file(
         &self,
         path: &Path,
@@ -174,9 +165,6 @@ impl Registry {
     }
 
     /// Writes a map in another format, at another reference state, with efficiencies of another definition.
-    ///
-    /// # Errors
-    /// As [`Registry::read_map_file`], [`MapWorkError`], and those of writing.
     pub fn convert_map_file(
         &self,
         path: &Path,
@@ -250,9 +238,6 @@ impl Registry {
     }
 
     /// Compares two maps of the same machine. `picture` is a new file that shows both.
-    ///
-    /// # Errors
-    /// As [`Registry::read_map_file`], [`MapWorkError`], and those of writing.
     pub fn compare_map_files(
         &self,
         [first, second]: [(&Path, &MapDescription); 2],

@@ -104,9 +104,6 @@ impl TestStand {
 impl Registry {
     /// Makes a map from a table of steady points. `machine` is a campaign, or a run directory with an identified thermal model; `budget` is a new
     /// file for the uncertainties by source.
-    ///
-    /// # Errors
-    /// As [`Registry::read_map`], [`MapWorkError`], [`SessionError::Campaign`], and those of writing.
     pub fn reduce_points(
         &self,
         path: &Path,
@@ -183,9 +180,6 @@ impl Registry {
     }
 
     /// Makes the map of a turbine from a table of steady points. `machine` is a campaign or run directory with the sensors.
-    ///
-    /// # Errors
-    /// As [`Registry::inspect_turbine`], [`MapWorkError::NotMeasured`], [`SessionError::Campaign`], and those of writing.
     pub fn reduce_turbine_points(
         &self,
         path: &Path,

@@ -59,9 +59,6 @@ pub struct CampaignForecast {
 impl Session<'_> {
     /// Simulates the steps of the campaign, or rehearses its script, and looks for settings that will give no result, and for
     /// calibrations that are not valid on the day of the run.
-    ///
-    /// # Errors
-    /// [`SessionError`] if the plan is missing, or the script fails.
     pub fn forecast_campaign(
         &self,
         campaign: &Campaign,

@@ -43,9 +43,6 @@ pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
 }
 
 /// Same as [`plan`], for a request that was already made from the campaign.
-///
-/// # Errors
-/// As [`plan`].
 pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, SessionError> {
     let mut plan = make_plan(request)?;
     plan.remarks.extend(zero_remark(campaign));

@@ -18,9 +18,6 @@ pub enum Existing {
 
 impl Existing {
     /// Refuses a file that exists and must be kept, before the work for its content.
-    ///
-    /// # Errors
-    /// [`SessionError::Exists`].
     pub fn check(self, path: &Path) -> Result<(), SessionError> {
         let is_kept = self == Existing::Kept && path.exists();
         if is_kept { Err(SessionError::Exists(path.to_owned())) } else { Ok(()) }

@@ -5,7 +5,7 @@ use mapper_campaign::Campaign;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, RedundantSensors};
 use mapper_identify::{IdentifyConfig, PressureTap, with_measured_humidity};
 use mapper_observe::declared::{StaticTap, with_total_pressures};
-use mapper_observe::redundant_sensors::fuse::{element_count, harmonise};
+use mapper_observe::fuse::{element_count, harmonise};
 use mapper_observe::{FusedChannel, fuse, judge_elements};
 use mapper_physics::simulation::model::Model;
 use mapper_recording::ChannelMap;

@@ -35,9 +35,6 @@ pub struct Identity {
 }
 
 /// Hash of the rig description: channels, rate, accepted ranges, safe trajectory.
-///
-/// # Errors
-/// [`SessionError::Json`] if it cannot be written as JSON.
 pub fn rig_sha256(rig: &RigDescription) -> Result<String, SessionError> {
     Ok(mapper_planner::sha256_hex(&serde_json::to_string(rig)?))
 }

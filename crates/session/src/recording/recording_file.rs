@@ -52,9 +52,6 @@ impl Recorded {
     }
 
     /// Same as [`read`](Recorded::read), from memory; messages call it `name`.
-    ///
-    /// # Errors
-    /// As [`read`](Recorded::read).
     pub fn read_bytes(
         registry: &Registry,
         bytes: &[u8],
@@ -84,9 +81,6 @@ impl Recorded {
 
     /// Same as [`read`](Recorded::read), for all recordings of a run directory. A resumed run has several; only the valid steps of each are
     /// returned.
-    ///
-    /// # Errors
-    /// As [`read`](Recorded::read).
     pub fn read_run(
         registry: &Registry,
         path: &Path,
@@ -120,9 +114,6 @@ impl Recorded {
     }
 
     /// Returns the campaign, or an error if the machine is unknown.
-    ///
-    /// # Errors
-    /// [`SessionError::MachineUnknown`] without a campaign.
     pub fn require_campaign(&self) -> Result<&Campaign, SessionError> {
         self.campaign.as_ref().ok_or(SessionError::MachineUnknown { channel_map_suffices: false })
     }
@@ -167,9 +158,6 @@ fn resumed_run(path: &Path) -> Result<Option<InterruptedRun>, SessionError> {
 
 /// Rejects a recording that was given twice, even if it was cut, renamed or exported again: its noise would count as new evidence. The parts of
 /// a run may share samples only if they come from a simulator without noise.
-///
-/// # Errors
-/// [`SessionError::SameRecording`] with both paths.
 pub fn check_all_distinct<'a>(recorded: impl IntoIterator<Item = &'a Recorded>) -> Result<(), SessionError> {
     let recorded: Vec<&Recorded> = recorded.into_iter().collect();
     if recorded.len() < 2 {

@@ -30,9 +30,6 @@ pub struct InterruptedRun {
 
 impl InterruptedRun {
     /// Reads the journal of a run directory.
-    ///
-    /// # Errors
-    /// [`SessionError::NotResumable`] if there is none.
     pub fn read(directory: &Path) -> Result<Self, SessionError> {
         let not_resumable = |why: String| SessionError::NotResumable { run: directory.to_owned(), why };
         let path = directory.join(run_directory::JOURNAL);

@@ -57,9 +57,6 @@ pub struct Pace<'a> {
 }
 
 /// Same as [`drive`], at a given pace.
-///
-/// # Errors
-/// As [`drive`].
 pub fn drive_paced(
     campaign: &Campaign,
     model: &Model,

@@ -204,9 +204,6 @@ impl RigStates {
     }
 
     /// Status of a rig.
-    ///
-    /// # Errors
-    /// [`SessionError::File`] for system errors.
     pub fn status(&self, rig: &str) -> Result<RigStatus, SessionError> {
         if !self.file(rig, "lock").exists() {
             return Ok(RigStatus {
@@ -300,9 +297,6 @@ impl RigStates {
 
 impl Claim {
     /// Records the owner of the rig.
-    ///
-    /// # Errors
-    /// [`SessionError::File`] for system errors.
     pub fn record_owner(&mut self, owner: &Owner) -> Result<(), SessionError> {
         self.write(Some(owner))
     }
@@ -319,9 +313,6 @@ impl Claim {
     }
 
     /// Prevents further runs until this lockout is acknowledged.
-    ///
-    /// # Errors
-    /// [`SessionError::File`] for system errors.
     pub fn lock_out(&self, lockout: &Lockout) -> Result<(), SessionError> {
         let path = self.states.file(&self.rig, "latch");
         let text = json_text(&Entry { rig: self.rig.clone(), content: lockout })?;
@@ -329,9 +320,6 @@ impl Claim {
     }
 
     /// Releases the rig in a safe state.
-    ///
-    /// # Errors
-    /// [`SessionError::File`] for system errors.
     pub fn release(mut self) -> Result<(), SessionError> {
         self.write(None)
     }

@@ -42,10 +42,6 @@ pub struct Sources {
 
 impl Registry {
     /// The rig of a campaign with all auxiliary instruments, not yet connected.
-    ///
-    /// # Errors
-    /// As [`Registry::make_backend`]; [`SessionError::Reader`] for an invalid source, missing channels, or channels that another source also
-    /// provides.
     pub fn make_sources(&self, campaign: &Campaign, model: &Model) -> Result<Sources, SessionError> {
         let rig = self.make_backend(campaign, model)?;
         if campaign.readers.is_empty() {

@@ -84,9 +84,6 @@ pub(crate) fn calibration_concerns(campaign: &Campaign, model: &Model, day: Opti
 }
 
 /// Loads a campaign, with its text, for a run on a day: the calibrations that it requires are valid then.
-///
-/// # Errors
-/// As [`mapper_campaign::load`].
 pub fn load_on(path: &Path, day: Option<Date>) -> Result<(Campaign, String), CampaignError> {
     let campaign = mapper_campaign::load(path)?;
     let text = read_text(path).map_err(|source| CampaignError::Read { path: path.to_owned(), source })?;

@@ -185,9 +185,6 @@ impl<'s> Session<'s> {
     }
 
     /// Prepares and runs.
-    ///
-    /// # Errors
-    /// As [`Session::prepare`] and [`PreparedRun::run`].
     pub fn run(&self, request: RunRequest<'_>) -> Result<RunOutcome, SessionError> {
         self.prepare(request)?.run(self)
     }
@@ -205,9 +202,6 @@ impl PreparedRun<'_> {
     }
 
     /// Drives the rig at full speed, records, identifies, reports.
-    ///
-    /// # Errors
-    /// As [`PreparedRun::run_paced`].
     pub fn run(self, session: &Session<'_>) -> Result<RunOutcome, SessionError> {
         self.run_paced(session, &mut UnpacedClock, false)
     }
@@ -234,9 +228,6 @@ impl PreparedRun<'_> {
     }
 
     /// Drives the rig at the pace of a clock and records, without results. Returns this run too.
-    ///
-    /// # Errors
-    /// As [`PreparedRun::run_paced`].
     pub fn record_paced(
         mut self,
         session: &Session<'_>,

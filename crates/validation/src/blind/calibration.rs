@@ -82,9 +82,6 @@ pub(crate) fn shipped() -> Result<Calibration, BlindError> {
 }
 
 /// The cases of a calibration.
-///
-/// # Errors
-/// [`BlindError`] if the campaign has no nominal model or cannot be run.
 pub fn cases(
     campaign: &Campaign,
     catalogue: &[Arc<dyn Effect>],
@@ -112,17 +109,11 @@ pub struct CalibrationSettings<'a> {
 
 impl<'a> CalibrationSettings<'a> {
     /// The settings with the shipped calibration.
-    ///
-    /// # Errors
-    /// [`BlindError`] if the campaign has no nominal model.
     pub fn new(campaign: &'a Campaign, catalogue: &'a [Arc<dyn Effect>]) -> Result<Self, BlindError> {
         Ok(CalibrationSettings { campaign, catalogue, nominal: nominal_model(campaign)?, before: shipped()? })
     }
 
     /// Runs and diagnoses a case; `None` if its recording cannot be diagnosed.
-    ///
-    /// # Errors
-    /// [`BlindError`] if it cannot be run.
     pub fn observe(&self, case: &Case) -> Result<Option<DiagnosisSummary>, BlindError> {
         let recording = Schedule::new(self.campaign, &self.nominal)?.record(case)?;
         let declared = declared(self.campaign);

@@ -32,9 +32,6 @@ pub struct CreatedCases {
 /// `directory`, which must not contain cases yet: NAME.mcap for each, NAME.baseline.mcap if requested, the answers, and a manifest with their hash.
 ///
 /// `done` receives the number of finished cases. Equal arguments give equal bytes.
-///
-/// # Errors
-/// [`BlindError`] if the campaign has no nominal model, a point cannot be held, or a file cannot be written.
 pub fn make(
     campaign: &Campaign,
     catalogue: &[Arc<dyn Effect>],
@@ -53,9 +50,6 @@ pub fn make(
 }
 
 /// Draws cases.
-///
-/// # Errors
-/// [`BlindError`] if the campaign has no nominal model or cannot be run, or there are too many.
 pub fn draw_cases(
     campaign: &Campaign,
     catalogue: &[Arc<dyn Effect>],
@@ -73,9 +67,6 @@ pub fn draw_cases(
 }
 
 /// Records one case in a new file and returns its answer.
-///
-/// # Errors
-/// [`BlindError`] if the lab stops, or the file cannot be written.
 pub fn record(
     campaign: &Campaign,
     case: &Case,
@@ -87,9 +78,6 @@ pub fn record(
 }
 
 /// Writes answers and the manifest with their hash into a directory that has neither.
-///
-/// # Errors
-/// [`BlindError::File`].
 pub fn seal(
     campaign: &str,
     laboratory: Laboratory,
@@ -176,9 +164,6 @@ pub struct Manifest {
 
 impl Manifest {
     /// Reads a manifest.
-    ///
-    /// # Errors
-    /// [`BlindError`] if it is missing or invalid.
     pub fn read(path: &Path) -> Result<Manifest, BlindError> {
         read_json(path, "manifest of blind cases")
     }
@@ -207,9 +192,6 @@ fn read(path: &Path) -> Result<Vec<u8>, BlindError> {
 }
 
 /// Reads the answers if they are unchanged.
-///
-/// # Errors
-/// [`BlindError::Seal`] if they were changed.
 pub(crate) fn open(directory: &Path, manifest: &Manifest) -> Result<Vec<Truth>, BlindError> {
     let path = directory.join(ANSWERS_NAME);
     let bytes = read(&path)?;

@@ -159,9 +159,6 @@ pub fn score(directory: &Path) -> Result<Score, BlindError> {
 }
 
 /// Writes NAME.truth.json of each answer next to its recording, for `score.py`.
-///
-/// # Errors
-/// As [`score`], and if a file cannot be written.
 pub fn open_answers(directory: &Path) -> Result<usize, BlindError> {
     let manifest = Manifest::read(&directory.join(MANIFEST_NAME))?;
     let truths = open(directory, &manifest)?;

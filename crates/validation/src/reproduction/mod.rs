@@ -17,9 +17,6 @@ pub use picture::{figure_json, reproduction_page};
 pub const FIGURES: [&str; 8] = ["5", "6", "7", "8", "9", "10", "11", "12"];
 
 /// Reproduces all figures; `progress` receives the number of each figure before it is computed.
-///
-/// # Errors
-/// [`ReproduceError`] if the model cannot be run or a recording cannot be identified.
 pub fn reproduce(mut progress: impl FnMut(&str)) -> Result<Vec<FigureResult>, ReproduceError> {
     let model = mapper_physics::simulation::model::Model::nominal();
     let mut results = Vec::with_capacity(FIGURES.len());

@@ -112,9 +112,6 @@ pub struct CalibrationResult {
 }
 
 /// Fits the calibration to diagnoses, and checks the reliability of its probabilities.
-///
-/// # Errors
-/// [`FleetError::Kind`] if the shipped calibration is damaged.
 pub fn fit_calibration(
     observed: &[DiagnosisSummary],
     made_by: String,

@@ -70,9 +70,6 @@ impl CampaignSource {
     }
 
     /// Parses the campaign. Its points are not checked again, because they were checked when the study was made.
-    ///
-    /// # Errors
-    /// [`StudyError::Campaign`].
     pub fn campaign(&self) -> Result<Campaign, StudyError> {
         let files = |file: &Path| {
             let missing = || Error::new(ErrorKind::NotFound, StudyError::File(file.display().to_string()));

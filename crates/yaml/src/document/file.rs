@@ -89,9 +89,6 @@ fn not_found_text(path: &Path) -> String {
 }
 
 /// Reads a file as text.
-///
-/// # Errors
-/// As [`read_limited`]. The inner error is the mistake of a file that is not UTF-8.
 pub fn open(
     document: &'static Document,
     path: &Path,

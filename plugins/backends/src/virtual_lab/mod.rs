@@ -5,16 +5,14 @@ mod lab;
 mod rig;
 mod samples;
 mod sensors;
-pub(crate) mod setting_problem;
 pub(crate) mod settings_file;
 
 pub use crate::virtual_lab::sensors::{LabElement, LabElements, SecondOrder, SensorErrors};
+pub use effects_file::{NAME, SettingProblem, check_range};
 pub use lab::VirtualLab;
 pub use rig::actuator::ActuatorDynamics;
-pub use rig::drift::{DriftTarget, LabDrift, Weather};
+pub use rig::drift::{DriftTarget, LabDrift, Weather, draw_tolerances};
 pub use rig::running::{LabInputs, RunningMachine, Structure, StructureError, SurgePrecursor};
-pub use rig::tolerances::draw_tolerances;
-pub use setting_problem::{NAME, SettingProblem, check_range};
 pub use settings_file::{LabSettings, Start, read_settings};
 
 use mapper_core::{Backend, BackendError};

@@ -1,12 +1,10 @@
 //! Settings of the virtual lab, and the file with them.
 
-use crate::virtual_lab::effects_file::{EffectValues, FaultFile, apply_effects, read_elements};
+use crate::virtual_lab::effects_file::{EffectValues, FaultFile, SettingProblem, apply_effects, check_range, read_elements};
 use crate::virtual_lab::rig::actuator::ActuatorDynamics;
-use crate::virtual_lab::rig::drift::{DriftFile, LabDrift, Weather, read_drifts};
+use crate::virtual_lab::rig::drift::{DriftFile, LabDrift, Weather, draw_tolerances, read_drifts};
 use crate::virtual_lab::rig::running::{Lumped, Structure, SurgePrecursor};
-use crate::virtual_lab::rig::tolerances::draw_tolerances;
 use crate::virtual_lab::sensors::{Draws, LabElements, SecondOrder, SensorErrors, draw, offset_kind};
-use crate::virtual_lab::setting_problem::{SettingProblem, check_range};
 use mapper_core::{ActuatorMotion, BackendError, Channel};
 use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::rig::backend_plugin::NominalRig;

@@ -90,9 +90,6 @@ impl Answer {
 }
 
 /// Parses the answer to a request; `body` is the text between STX and ETX.
-///
-/// # Errors
-/// [`TelegramError`] if the body is not an answer, or answers another request.
 pub fn parse_answer(body: &[u8], requested: Code) -> Result<Answer, TelegramError> {
     let malformed = || TelegramError::Malformed(String::from_utf8_lossy(body).into_owned());
     let (Some(code), Some(b' '), Some(status)) = (body.get(1..5), body.get(5), body.get(6)) else {
@@ -143,9 +140,6 @@ impl Assembler {
 }
 
 /// Parses a request to an instrument: code, channel and parameters.
-///
-/// # Errors
-/// [`TelegramError::Malformed`]
 pub fn parse_request(body: &[u8]) -> Result<(Code, u8, String), TelegramError> {
     let malformed = || TelegramError::Malformed(String::from_utf8_lossy(body).into_owned());
     let text = std::str::from_utf8(body.get(1..).ok_or_else(malformed)?).map_err(|_| malformed())?;

@@ -143,17 +143,11 @@ pub enum LimitError {
 const MAX_STEP_RATIO: f64 = 0.05;
 
 /// Returns the scale if it is invertible.
-///
-/// # Errors
-/// [`LimitError::Scale`], also for 0 and NaN.
 pub fn check_scale(scale: f64) -> Result<f64, LimitError> {
     if (1e-12..=1e12).contains(&scale.abs()) { Ok(scale) } else { Err(LimitError::Scale(scale)) }
 }
 
 /// Checks the resolution of a setpoint that is written as a whole number; `step` is its increment, SI.
-///
-/// # Errors
-/// [`LimitError::Coarse`].
 pub fn check_resolution(target: Target, step: f64, range: SetpointRange) -> Result<(), LimitError> {
     let SetpointRange { low, high } = range;
     match target {
@@ -164,9 +158,6 @@ pub fn check_resolution(target: Target, step: f64, range: SetpointRange) -> Resu
 }
 
 /// Returns the value if it lies within bounds.
-///
-/// # Errors
-/// [`LimitError::Outside`], also for NaN.
 pub fn check_range(value: f64, unit: &'static str, low: f64, high: f64) -> Result<f64, LimitError> {
     if (low..=high).contains(&value) {
         Ok(value)

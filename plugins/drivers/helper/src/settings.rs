@@ -89,9 +89,6 @@ pub enum SecretError {
 }
 
 /// The secret named by a setting `{env: NAME}`; `None` for `null`.
-///
-/// # Errors
-/// [`SecretError`], which never contains the secret.
 pub fn secret(setting: &Value) -> Result<Option<String>, SecretError> {
     if setting.is_null() {
         return Ok(None);

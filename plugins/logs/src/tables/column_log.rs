@@ -1,7 +1,7 @@
 //! A log whose columns are in memory, in one or several tables, and its rows.
 
-use crate::columns::clock::HEAD_ROWS;
-use crate::tables::joined_tables::{Part, join_tables};
+use crate::clock::HEAD_ROWS;
+use crate::tables::long_table::{Part, join_tables};
 use crate::tables::table_log::{Origin, Table};
 use crate::tables::table_row::{Cell, Cells, Rows};
 use mapper_recording::logs::limits::MAX_UNPACKED_BYTES;
@@ -41,9 +41,6 @@ impl Chunk {
 /// A source of columns, some rows at a time.
 pub(crate) trait Chunks {
     /// The next rows of each column, and their number; `None` at the end.
-    ///
-    /// # Errors
-    /// [`LogError`] if the file cannot be read further.
     fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError>;
 }
 
@@ -151,9 +148,6 @@ struct ColumnLog {
 }
 
 /// The log of tables. `word` is the format's term for a table; `problems` lists unread parts of the file.
-///
-/// # Errors
-/// [`LogError`] if no table has a clock.
 pub(crate) fn column_log(
     file: &LogFile,
     (name, word): (&'static str, &str),

@@ -1,7 +1,7 @@
 //! Record batches of Arrow and Parquet, as the rows of one table.
 
-use crate::columns::clock::HEAD_ROWS;
-use crate::columns::table_head::MAX_COLUMNS;
+use crate::clock::HEAD_ROWS;
+use crate::table_head::MAX_COLUMNS;
 use crate::tables::column_log::{COLUMN_OPTIONS, Chunk, Chunks, ColumnRows};
 use crate::tables::table_log::{Origin, Table};
 use arrow_array::cast::AsArray;

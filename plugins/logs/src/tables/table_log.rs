@@ -1,8 +1,8 @@
 //! A table as a log: its clocks, its columns, and its stream of rows.
 
-use crate::columns::clock::{ClockReader, Sample};
-use crate::columns::clock_choice::{Clocks, choose_clocks};
-use crate::columns::table_head::{TableHead, analyse_head};
+use crate::clock::{ClockReader, Sample};
+use crate::clock_choice::{Clocks, choose_clocks};
+use crate::table_head::{TableHead, analyse_head};
 use crate::tables::table_row::{Cell, Cells, RowSorter, Rows};
 use mapper_recording::logs::{Column, Layout, LogError, LogFinding, LogOptions, Row, RowSink};
 use std::collections::BTreeMap;

@@ -54,9 +54,6 @@ pub(crate) trait Cells {
 /// Rows one after the other.
 pub(crate) trait Rows: Cells {
     /// Advances to the next row; `false` after the last one.
-    ///
-    /// # Errors
-    /// [`LogError`] if the file cannot be read further.
     fn advance(&mut self) -> Result<bool, LogError>;
 }
 

@@ -70,9 +70,6 @@ pub struct DescriptionSource {
 
 impl MapSource {
     /// The map of the table; `None` for the closed form.
-    ///
-    /// # Errors
-    /// [`NominalTableError`] if the text is not a map; this cannot happen in a checked campaign.
     pub fn table(&self) -> Option<Result<TabulatedMap, NominalTableError>> {
         let MapSource::Table { text, reference, description, .. } = self else { return None };
         let given =
@@ -242,9 +239,6 @@ pub enum NominalTableError {
 }
 
 /// Reads the nominal map. `given` is the map description with at least the reference state.
-///
-/// # Errors
-/// [`NominalTableError`] with the line of the file.
 pub fn nominal_table(
     text: &str,
     given: impl Into<MapDescription>,

@@ -132,9 +132,6 @@ impl From<&Fit> for Start {
 }
 
 /// Fits nuisances and effects from a start: a hypothesis, or another fit.
-///
-/// # Errors
-/// [`PredictError`] if the model cannot follow at the start itself.
 pub(crate) fn fit(
     study: &Study,
     linearised: &Linearised,
@@ -375,9 +372,6 @@ const IMITATION: Effort =
     Effort { iterations: 5, enough: 0.5, max_sigmas: 60.0, max_sigmas_of_rig: 60.0, exact: true };
 
 /// Signature length of each of `effects` (indices into the study's effects, with values), given the others.
-///
-/// # Errors
-/// [`PredictError`] if the model cannot follow the recording with these effects.
 pub(crate) fn lengths(
     study: &Study,
     linearised: &Linearised,

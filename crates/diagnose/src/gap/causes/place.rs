@@ -7,7 +7,7 @@
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::prior_of_number;
-use crate::gap::findings::report::Place;
+use crate::gap::report::Place;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::prediction::PointState;
 use crate::gap::residuals::study::{Study, members};

@@ -1,12 +1,12 @@
 //! Predictions of the residuals, and the state of each point.
 
-use crate::gap::model_error::structure::repeating_part;
 use crate::gap::residuals::nuisance::{Circumstances, Hypothesis, OUTPUTS, RESPONSES_S};
 use crate::gap::residuals::study::{PredictError, Prediction, Study};
 use crate::gap::residuals::true_inputs::{
     LinearisedMachine, LinearisedSamples, MEASURED, MachineRun, Sample, SampleValues, SurroundingsHistory,
     TrueInputs, with_metal_held,
 };
+use crate::gap::structure::repeating_part;
 use mapper_core::Channel;
 use mapper_observe::averages::{estimate_state, mean_reading};
 use mapper_observe::model_inputs::lagged_command::{LaggedCommand, Response};

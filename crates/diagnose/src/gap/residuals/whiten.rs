@@ -1,9 +1,9 @@
 //! Residuals scaled by the noise and the uncertainty of the inputs.
 
-use crate::gap::model_error::structure::{repeating_part, step_errors};
 use crate::gap::residuals::nuisance::{JUMP_S, NuisanceKind, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::gap::residuals::true_inputs::LinearisedMachine;
+use crate::gap::structure::{repeating_part, step_errors};
 use mapper_core::Channel;
 use mapper_numerics::coloured_noise::{ColouredNoise, WhiteningFactor, covariance_of_means};
 use mapper_numerics::parallel;
@@ -58,9 +58,6 @@ impl Noise {
 
 impl Linearised {
     /// Linearises at the nominal model.
-    ///
-    /// # Errors
-    /// [`PredictError`] if the nominal model cannot follow the recording.
     pub fn new(study: &Study) -> Result<Linearised, PredictError> {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
@@ -79,9 +76,6 @@ impl Linearised {
     }
 
     /// Linearises at a hypothesis and keeps the whitening.
-    ///
-    /// # Errors
-    /// [`PredictError`] if the model cannot follow there.
     pub fn at(&self, study: &Study, hypothesis: &Hypothesis) -> Result<Linearised, PredictError> {
         let base = study.predict(hypothesis)?;
         let machine = LinearisedMachine::of(&base.run);

@@ -2,13 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use crate::closure::balance::Balance;
 use crate::closure::columns::Base;
 use crate::closure::description::{ClosureDescription, script_of, sink};
 use crate::closure::expression::{Expression, Span, Spans};
 use crate::closure::library::library;
 use crate::closure::residual_source::residual_sources;
-use crate::closure::term::{ClosureEffect, Role, Term};
+use crate::closure::term::{Balance, ClosureEffect, Role, Term};
 use crate::gap;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::Linearised;

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::gap::diagnose::{Diagnosed, gap};
-use crate::gap::findings::experiment::GapWarning;
-use crate::gap::findings::report::Verdict;
+use crate::gap::experiment::GapWarning;
 use crate::gap::preconditions::{GapError, Problem};
+use crate::gap::report::Verdict;
 use crate::gap::request::{BaselineRecording, GapRequest, RigRecording};
 use crate::inside::gap::common::{Visits, declared, effects, record_another_night, record_of, request};
 use mapper_core::{Channel, Recording};

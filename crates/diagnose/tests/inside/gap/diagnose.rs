@@ -5,10 +5,10 @@
 use crate::gap::calibrated_model::{ForecastCheck, Found};
 use crate::gap::causes::additions::Calibration;
 use crate::gap::diagnose::{Diagnosed, gap};
-use crate::gap::findings::experiment::{AllowedJump, Experiment, GapWarning};
-use crate::gap::findings::report::Verdict;
+use crate::gap::experiment::{AllowedJump, Experiment, GapWarning};
 use crate::gap::next_experiment::{approximate_separation, separation};
 use crate::gap::preconditions::{GapError, Problem, usable};
+use crate::gap::report::Verdict;
 use crate::gap::request::RigRecording;
 use crate::gap::residuals::nuisance::NuisanceKind;
 use crate::gap::residuals::study::Study;

@@ -4,9 +4,9 @@
 
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::diagnose::{Diagnosed, gap};
-use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment};
-use crate::gap::findings::report::{Kind, Next};
+use crate::gap::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment};
 use crate::gap::next_experiment::{Rivals, Suggested, next, separation};
+use crate::gap::report::{Kind, Next};
 use crate::inside::gap::common::{self, Visits, boundary, declared};
 use mapper_core::{Channel, OperatingPoint, Recording, StepKind, StepMarker};
 use mapper_observe::averages::Table;

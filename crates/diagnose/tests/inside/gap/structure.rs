@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::gap::diagnose::gap;
-use crate::gap::findings::report::{Diagnosis, Verdict};
+use crate::gap::report::{Diagnosis, Verdict};
 use crate::gap::request::{BaselineRecording, GapRequest, RigRecording};
 use crate::inside::gap::common::{Visits, declared, effects, record_of, request};
 use mapper_core::Recording;

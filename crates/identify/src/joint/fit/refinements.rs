@@ -13,9 +13,8 @@ use crate::joint::step_model::parameters::{
     ALPHA, ETA, INLET, LN_COEFFICIENT, Prior, REFINEMENTS, Refinement,
 };
 use mapper_core::{IdentifiedInlet, InletConvection, Origin, standard_error_of};
-use mapper_inference::interval;
-use mapper_inference::interval::COVERAGE;
 use mapper_inference::mixture::{Draw, Mixture, Parameter};
+use mapper_inference::posterior::{self, COVERAGE};
 use mapper_numerics::statistics::{HINT_SIGMAS, mean};
 use nalgebra::{DMatrix, DVector, Matrix4xX};
 use std::collections::BTreeMap;
@@ -196,9 +195,9 @@ impl Refinements {
         let mixed = centres(&self.mixture.draws);
         let spread: f64 = mixed.iter().map(|(weight, centre)| weight * (centre - value).powi(2)).sum();
         let sigma = (variance - spread).max(0.0).sqrt();
-        let (low, high) = interval::shortest(&mixed, sigma, interval::COVERAGE)?;
+        let (low, high) = posterior::shortest(&mixed, sigma, COVERAGE)?;
         let free = centres(&self.mixture.all_free);
-        let (free_low, free_high) = interval::shortest(&free, sigma, interval::COVERAGE)?;
+        let (free_low, free_high) = posterior::shortest(&free, sigma, COVERAGE)?;
         let (low, high) = (low.min(free_low), high.max(free_high));
         let added = (standard_error_of(low, high).powi(2) - variance).max(0.0).sqrt();
         let moved: f64 = free.iter().map(|(weight, centre)| weight * (centre - value)).sum();

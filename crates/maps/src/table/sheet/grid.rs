@@ -70,9 +70,6 @@ impl Grid {
     }
 
     /// The cells of a text.
-    ///
-    /// # Errors
-    /// [`ImportError::TooMany`] if it has more rows than any map.
     pub(crate) fn of_text(text: &str) -> Result<Grid, ImportError> {
         let too_many = |line| ImportError::TooMany { line, limit: MAX_ROWS };
         let (mut content, mut comments, mut comment_lines) = (String::new(), String::new(), Vec::new());

@@ -52,9 +52,6 @@ impl Point<'_> {
 const EXTRAPOLATED: &str = "extrapolated";
 
 /// The points of a table.
-///
-/// # Errors
-/// [`ImportError`] with the line of a cell that is not a number, or of a row that is cut short.
 pub(crate) fn points<'a>(
     grid: &Grid,
     described: &DescribedColumns,

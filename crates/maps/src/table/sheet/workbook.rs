@@ -143,9 +143,6 @@ fn too_large() -> String {
 }
 
 /// The text of a map file; of a workbook, its sheet with numbers as CSV.
-///
-/// # Errors
-/// [`ImportError`] if it is neither text nor a workbook.
 pub fn file_text(bytes: &[u8]) -> Result<String, ImportError> {
     let bytes = unpack(bytes)?;
     if is_workbook(&bytes) { Ok(grid_of_workbook(&bytes, None)?.csv()) } else { text_of(&bytes) }

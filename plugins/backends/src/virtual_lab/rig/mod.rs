@@ -3,4 +3,3 @@
 pub(crate) mod actuator;
 pub(crate) mod drift;
 pub(crate) mod running;
-pub(crate) mod tolerances;

@@ -2,7 +2,7 @@
 
 use crate::virtual_lab::rig::actuator::{Actuator, ActuatorDynamics};
 use crate::virtual_lab::rig::drift::Weather;
-use crate::virtual_lab::setting_problem::NAME;
+use crate::virtual_lab::effects_file::NAME;
 use mapper_physics::gas::air;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::simulation::steady::Inputs;
@@ -28,9 +28,6 @@ pub trait RunningMachine: std::fmt::Debug + Send {
     fn change_params(&mut self, params: Params);
 
     /// Runs to `end_s`, with samples and events on the way, as [`Simulator::run_to`] does.
-    ///
-    /// # Errors
-    /// [`SimulationError`] if the inputs are invalid or the tolerance cannot be met.
     fn run_to(
         &mut self,
         end_s: f64,

@@ -5,8 +5,8 @@
 //! of their mean is the mean of their lags, which is sufficient for slow changes.
 
 use crate::averages::resample;
-use crate::redundant_sensors::element_fault::{Contradiction, FaultyElement, FusedChannel};
-use crate::redundant_sensors::element_judge::{FALSE_ALARMS_RATIO, Judgement, comparisons, judge};
+use crate::element_fault::{Contradiction, FaultyElement, FusedChannel};
+use crate::element_judge::{FALSE_ALARMS_RATIO, Judgement, comparisons, judge};
 use mapper_core::{
     Channel, DeclaredUncertainty, Element, FaultKind, NoiseColour, Recording, RedundantSensors, Series,
     is_reading,

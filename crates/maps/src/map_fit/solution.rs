@@ -6,8 +6,8 @@
 //! does not determine stay straight.
 
 use crate::map_fit::MapFitError;
-use crate::map_fit::least_squares::observations::Observations;
-use crate::map_fit::least_squares::problem::{
+use crate::map_fit::observations::Observations;
+use crate::map_fit::problem::{
     LINE_OFFSETS, Precisions, Problem, ROBUST_SIGMAS, ROUGHNESS_PRECISION_RANGE, Unknowns,
 };
 use crate::map_fit::speed_lines::{

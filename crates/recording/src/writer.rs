@@ -1,6 +1,6 @@
 //! Writes a recording: one message per device group and sample, flushed each second of the run's clock.
 
-use crate::writing::topics::{
+use crate::topics::{
     ELEMENTS_TOPIC, Field, McapFile, OpenedFile, ProvenanceWriter, RecordingHeader, StepPhase, TRUTH_TOPIC,
     Topic, add_channel, event_message, io_error, open, step_message,
 };
@@ -155,9 +155,6 @@ impl RecordingWriter {
     }
 
     /// Writes one event.
-    ///
-    /// # Errors
-    /// As [`write_batch`](Self::write_batch).
     pub fn write_event(&mut self, event: &Event) -> Result<(), RecordError> {
         let log_time = self.advance(event.t_s)?;
         let sequence = self.events_written;
@@ -166,9 +163,6 @@ impl RecordingWriter {
     }
 
     /// Writes the start or the end of a step.
-    ///
-    /// # Errors
-    /// As [`write_batch`](Self::write_batch).
     pub fn write_step(&mut self, step: &StepMarker, phase: StepPhase) -> Result<(), RecordError> {
         let (t_s, message) = step_message(step, phase);
         let log_time = self.advance(t_s)?;

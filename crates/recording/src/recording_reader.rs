@@ -5,14 +5,14 @@ use crate::channel_mapping::channel_map_yaml::MapMistakes;
 use crate::channel_mapping::plausibility;
 use crate::channel_mapping::plausibility::Readings;
 use crate::jump_steps::{drop_rest_steps, hold_at_step_ends, reversal_share};
+use crate::log_reader::{is_mcap, log_of_path, read_log};
 use crate::logs::{LogError, LogFile};
-use crate::reading::log_reader::{is_mcap, log_of_path, read_log};
-use crate::reading::scan::{ReadOptions, ScanResult, scan};
 use crate::samples::clock_steps::{repair_gaps, repair_set_back, repair_set_forward};
 use crate::samples::rig_sink::{PositionedMessage, RigSink};
 use crate::samples::series_builder::{SeriesBuilder, run_time_s};
+use crate::scan::{ReadOptions, ScanResult, scan};
 use crate::steps::{find_steps, hollow_steps, span_s, steps_from_markers};
-use crate::writing::topics::OriginMessage;
+use crate::topics::OriginMessage;
 use crate::{AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError};
 use mapper_core::unit_factors::PERCENT;
 use mapper_core::{
@@ -66,9 +66,6 @@ pub fn read_recording(
 
 /// Reads only the steps, from their markers, and the events of a recording of this program. A step without an end and without a
 /// following step ends where it begins.
-///
-/// # Errors
-/// As [`read_recording`].
 pub fn read_marks(path: &Path, options: &ReadOptions) -> Result<(Vec<StepMarker>, Vec<Event>), RecordError> {
     let map = ChannelMap { channels: BTreeMap::new(), elements: BTreeMap::new(), ..ChannelMap::native() };
     let recording = read(path, &map, options, &|| open(path))?.recording;
@@ -76,9 +73,6 @@ pub fn read_marks(path: &Path, options: &ReadOptions) -> Result<(Vec<StepMarker>
 }
 
 /// Reads a recording from memory; messages call it `name`. Otherwise as [`read_recording`].
-///
-/// # Errors
-/// As [`read_recording`].
 pub fn read_recording_from(
     bytes: &[u8],
     name: &Path,
@@ -177,7 +171,7 @@ fn check_fits_mcap(map: &ChannelMap) -> Result<(), RecordError> {
 }
 
 fn is_own_topic(topic: &str) -> bool {
-    use crate::writing::topics::{EVENT_TOPIC, STEP_TOPIC, TRUTH_PREFIX};
+    use crate::topics::{EVENT_TOPIC, STEP_TOPIC, TRUTH_PREFIX};
     topic == STEP_TOPIC || topic == EVENT_TOPIC || topic.starts_with(TRUTH_PREFIX)
 }
 

@@ -4,7 +4,7 @@
 //! judged again, as long as more than half of the sensors remain. Of two sensors the wrong one cannot be identified. A stuck or silent
 //! sensor is identified by its own readings.
 
-use crate::redundant_sensors::element_fault::ElementFault;
+use crate::element_fault::ElementFault;
 use mapper_core::{
     COARSE_REPEAT_S, COARSE_REPEAT_SAMPLES, Channel, FaultKind, NoiseColour, RedundantSensors, Series,
     is_reading, repeats,

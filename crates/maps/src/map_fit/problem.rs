@@ -4,7 +4,7 @@
 //! the day that a whole line shares). The residuals are orthogonal distance and efficiency, with Cauchy weights at three standard errors.
 
 use crate::map_fit::MapFitError;
-use crate::map_fit::least_squares::observations::{Observation, Observations};
+use crate::map_fit::observations::{Observation, Observations};
 use crate::map_fit::speed_lines::{
     CHOKE_FLOW, CHOKE_HEAD, EXPONENTS, FlowFrame, Foot, LineShape, MIN_SQUARE_SLOPE, PARAMETERS, Parameters,
     Rows, Scales, Splines, WORK, ZERO_SLOPE_FLOW, ZERO_SLOPE_HEAD, nearest, normal,

@@ -2,12 +2,12 @@
 
 use crate::gap::best_fit::fit::MAX_SIGMAS;
 use crate::gap::best_fit::normal::{Selection, dot_over, nuisance_products};
-use crate::gap::findings::experiment::GapWarning;
-use crate::gap::model_error::structure::{covariance_of_errors, variation};
+use crate::gap::experiment::GapWarning;
 use crate::gap::preconditions::{GapError, Problem, Zeroed, another_machine, checked_study};
 use crate::gap::residuals::nuisance::{Hypothesis, JUMP_S, NuisanceKind, OUTPUTS, nuisances};
 use crate::gap::residuals::study::{Group, PredictError, Study};
 use crate::gap::residuals::whiten::{Linearised, dot};
+use crate::gap::structure::{covariance_of_errors, variation};
 use mapper_core::unit_factors::PA_PER_KPA;
 use mapper_core::{Channel, jump_ratio};
 use mapper_identify::LONGEST_BRIDGE_S;

@@ -1,7 +1,7 @@
 //! The first rows of a table, from which its clocks are found; columns that count time, with the seconds per count; the clock of a table, which
 //! gives the time of each row.
 
-use crate::columns::table_head::HeadColumn;
+use crate::table_head::HeadColumn;
 use crate::tables::table_row::{Cell, Cells};
 use mapper_recording::Kind;
 use mapper_recording::logs::LogFinding;

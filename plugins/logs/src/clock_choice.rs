@@ -1,10 +1,10 @@
 //! Finds the clocks of a table, selects the ones to read, and assigns columns to them.
 
-use crate::columns::clock::{
+use crate::clock::{
     Clock, GroupClock, NS_PER_HOUR, Sample, SampleRow, Spread, cells, count_unit_s, describe_unit,
     is_clock_name, restart_offset_ns,
 };
-use crate::columns::table_head::HeadColumn;
+use crate::table_head::HeadColumn;
 use mapper_recording::logs::{Group, LogFinding, LogOptions};
 use mapper_table::{
     DateOrder, Instant, NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant, parse_number,

@@ -1,7 +1,7 @@
 //! Diagnosis report, machine-readable.
 
-use crate::gap::findings::experiment::{AlsoChanged, Experiment, GapWarning, OffsetAtRest};
-use crate::gap::model_error::baseline::Baseline;
+use crate::gap::baseline::Baseline;
+use crate::gap::experiment::{AlsoChanged, Experiment, GapWarning, OffsetAtRest};
 use mapper_core::unit_factors::{CM2_PER_M2, G_PER_KG, MM_PER_M, PERCENT};
 use mapper_core::{probability_text, with_unit};
 use mapper_physics::laws::turbine::at_150_krpm;

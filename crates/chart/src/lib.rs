@@ -29,7 +29,6 @@ mod items;
 mod layout;
 mod map_drawing;
 pub mod palette;
-mod png;
 mod svg;
 mod text;
 
@@ -41,4 +40,4 @@ pub use items::{
 };
 pub use map_drawing::{ContourDrawing, EtaDrawing, LineDrawing, MapDrawing, NodeDrawing};
 pub use palette::Colour;
-pub use png::PngError;
+pub use svg::PngError;

@@ -1,8 +1,7 @@
 //! A study in its directory: the interface of its kind, and how both are made.
 
 use crate::files::{Durability, make_directory, write_whole};
-use crate::part::{Part, PartRefusal};
-use crate::study::{LAYOUT, MAX_ITEMS};
+use crate::study::{LAYOUT, MAX_ITEMS, Part, PartRefusal};
 use crate::{FleetError, Hash, Item, ItemEntry, Study, StudyFile};
 use serde_json::Value;
 use std::collections::BTreeSet;

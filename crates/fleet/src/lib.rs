@@ -10,7 +10,6 @@
 
 mod files;
 mod fleet;
-mod part;
 mod status;
 mod study;
 mod submit;
@@ -20,8 +19,8 @@ pub use files::{FleetError, Hash, Machine, StudyFileError};
 pub use fleet::{
     CreatedStudy, Fleet, ItemDraft, Kind, Output, Results, StudyDraft, WorkContext, WorkError, kind_of,
 };
-pub(crate) use part::{Outcome, Part};
 pub use status::{MergeOutcome, Shard, Status, UnfinishedItem};
 pub use study::{Item, ItemEntry, Study, StudyFile, open_study};
+pub(crate) use study::{Outcome, Part};
 pub use submit::{Limits, Submission, SubmitOptions, Template, number_ranges, query_task_states};
 pub use work::{Cost, CostEstimate, Engine, ItemSelection, WorkOutcome, cores};

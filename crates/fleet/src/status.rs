@@ -3,7 +3,7 @@
 
 use crate::files::{Machine, file_name_safe, make_directory, read_at_most};
 use crate::fleet::part_name;
-use crate::part::PartRefusal;
+use crate::study::PartRefusal;
 use crate::{Fleet, FleetError, Hash, ItemEntry, Kind, Outcome, Output, Part};
 use serde::Serialize;
 use std::cell::RefCell;

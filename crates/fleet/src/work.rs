@@ -1,7 +1,7 @@
 //! Executes items on the cores of this machine, the loop of all long work, and estimates their cost from a few.
 
 use crate::files::Machine;
-use crate::part::{Outcome, Part};
+use crate::study::{Outcome, Part};
 use crate::{Fleet, FleetError, Hash, Item, ItemEntry, Kind, Shard, Status, WorkContext, WorkError};
 use mapper_numerics::parallel;
 use serde::Serialize;

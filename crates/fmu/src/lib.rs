@@ -8,7 +8,6 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod files;
-mod header;
 mod variables;
 
 pub use files::{FmuFile, archive, files};

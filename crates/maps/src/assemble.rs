@@ -17,8 +17,7 @@ use serde::Serialize;
 /// Similarity moves each point from its own corrected speed to the mean speed of its line. The change is stored in
 /// [`MapPoint::shift`], the measured point in [`MapPoint::identified`].
 ///
-/// Points with a target form a line per target speed; points without one are grouped by gaps in corrected speed
-/// (`grouping.rs`). Lines come in order of mean corrected speed, their points in order of corrected flow (then of
+/// Points with a target form a line per target speed; points without one are grouped by gaps in corrected speed. Lines come in order of mean corrected speed, their points in order of corrected flow (then of
 /// falling pressure ratio, for the vertical part at choke). Repeats for the detection of
 /// drift are left out unless the point itself has no efficiency. An unusable point keeps
 /// flow and pressure ratio, without `eta`.

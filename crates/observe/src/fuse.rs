@@ -5,8 +5,9 @@
 //! of their mean is the mean of their lags, which is sufficient for slow changes.
 
 use crate::averages::resample;
-use crate::element_fault::{Contradiction, FaultyElement, FusedChannel};
-use crate::element_judge::{FALSE_ALARMS_RATIO, Judgement, comparisons, judge};
+use crate::element_judge::{
+    Contradiction, FALSE_ALARMS_RATIO, FaultyElement, FusedChannel, Judgement, comparisons, judge,
+};
 use mapper_core::{
     Channel, DeclaredUncertainty, Element, FaultKind, NoiseColour, Recording, RedundantSensors, Series,
     is_reading,

@@ -8,7 +8,6 @@
 pub mod acceptance;
 pub mod averages;
 pub mod declared;
-pub mod element_fault;
 pub(crate) mod element_judge;
 pub mod energy_balance;
 pub mod fuse;
@@ -17,6 +16,6 @@ pub mod model_inputs;
 pub mod perturbation;
 
 pub use declared::{Declared, declared_uncertainties};
-pub use element_fault::{Contradiction, ElementFault, FaultyElement, FusedChannel};
+pub use element_judge::{Contradiction, ElementFault, FaultyElement, FusedChannel};
 pub use fuse::{fuse, judge_elements};
 pub use measured_stand::{Fitted, MeasuredValue, OtherMachine, measure_actuators, same_machine};

@@ -10,11 +10,11 @@ const LONGEST_LINES: usize = 600;
 /// A file of fewer lines holds a part of a concept.
 const SHORT_LINES: usize = 60;
 /// Maximum share of short files; it may only fall, to a tenth.
-const MAX_SHORT_SHARE: f64 = 0.13;
+const MAX_SHORT_SHARE: f64 = 0.11;
 /// Maximum number of production files; it may only fall, to 650.
-const MAX_FILES: usize = 820;
+const MAX_FILES: usize = 700;
 /// Maximum number of production lines; it may only fall, to 118 000, which a few engineers can own.
-const MAX_LINES: usize = 137_400;
+const MAX_LINES: usize = 134_800;
 /// All of the program's own crate, tests included: what decides anything lies below it.
 const CLI_LINES: usize = 5_000;
 

@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// Unknowns, in the order of [`CompressorSide::predict`]. The area split and the probe keep their declared values, because they are library causes. The
 /// prior of the efficiency is wide and includes map shapes beyond a parabola, so that no cause is named for a good compressor.
 /// Bound: published maps of automotive compressors, and housings from bare to insulated, lie within two sigmas.
-static UNKNOWNS: [Parameter; 16] = {
+const UNKNOWNS: [Parameter; 16] = {
     const fn further(name: &'static str, description: &'static str) -> Parameter {
         normal(name, "", 0.0, 0.15, description)
     }
@@ -65,7 +65,7 @@ fn flow_coefficient(speed_rpm: f64, flow_kg_s: f64, p1_pa: f64, t1_k: f64) -> f6
 
 /// Errors of T2 (a polynomial map and a single node of a housing) and of Tc (one thermocouple for a whole housing). Judgement: medians of the
 /// residuals of good engine logs.
-static MODEL_ERRORS: [ModelError; 2] = [
+const MODEL_ERRORS: [ModelError; 2] = [
     ModelError { median_k: 0.18, width: 0.25, correlation_s: CORRELATION_S },
     ModelError { median_k: 3.0, width: 0.0, correlation_s: HOUSING_CORRELATION_S },
 ];
@@ -87,25 +87,16 @@ pub(crate) struct CompressorSide {
 impl SideModel for CompressorSide {
     const SIDE: Side = Side::Compressor;
     const PRESSURE: Channel = Channel::P2;
-
-    fn channels() -> SideChannels<'static> {
-        SideChannels {
-            drives: &[Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::P2, Channel::T1],
-            judged: &[Channel::T2, Channel::Tc],
-            is_usable: |row| {
-                let [speed_rpm, flow_kg_s, p1_pa, p2_pa, _] = *row else { return false };
-                does_work(speed_rpm, flow_kg_s, p1_pa, p2_pa)
-            },
-        }
-    }
-
-    fn unknowns() -> &'static [Parameter] {
-        &UNKNOWNS
-    }
-
-    fn model_errors() -> &'static [ModelError] {
-        &MODEL_ERRORS
-    }
+    const UNKNOWNS: &'static [Parameter] = &UNKNOWNS;
+    const MODEL_ERRORS: &'static [ModelError] = &MODEL_ERRORS;
+    const CHANNELS: SideChannels<'static> = SideChannels {
+        drives: &[Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::P2, Channel::T1],
+        judged: &[Channel::T2, Channel::Tc],
+        is_usable: |row| {
+            let [speed_rpm, flow_kg_s, p1_pa, p2_pa, _] = *row else { return false };
+            does_work(speed_rpm, flow_kg_s, p1_pa, p2_pa)
+        },
+    };
 
     fn of(rows: Rows) -> Self {
         let (middle_speed_rpm, middle_flow) = middles(&rows);

@@ -58,12 +58,12 @@ pub fn diagnose(request: &SideRequest<'_>, side: Side) -> Result<Diagnosis, Driv
 }
 
 fn diagnose_side<S: SideModel>(request: &SideRequest<'_>) -> Result<Diagnosis, DrivenError> {
-    let all = Rows::read(request.recording, S::channels())?;
+    let all = Rows::read(request.recording, S::CHANNELS)?;
     let (calibration, lost_rows) = (request.calibration, all.lost);
     let rows = denoised(&all, request.declared).thinned(MAX_CORRELATED_ROWS);
     let fitted = rows.t_s.partition_point(|t_s| *t_s < request.fit_until_s);
     // Twice the unknowns.
-    let needed = 2 * S::unknowns().len();
+    let needed = 2 * S::UNKNOWNS.len();
     if fitted < needed {
         let (rows, until_s) = (fitted, request.fit_until_s);
         return Err(DrivenError::TooFewRows { rows, until_s, needed });
@@ -88,7 +88,7 @@ fn diagnose_side<S: SideModel>(request: &SideRequest<'_>) -> Result<Diagnosis, D
         .flat_map(|place| fit_of(place).hypothesis.effects.iter().map(|(effect, _)| *effect))
         .collect();
     let rows = side.rows();
-    let drives = [S::channels().drives[0], S::PRESSURE];
+    let drives = [S::CHANNELS.drives[0], S::PRESSURE];
     let phases = phases(rows, fitted, &drives);
     let held_out = held_out(&problem, &phases, &found.null, &choices, calibration, diagnosable.len());
     // Noise of the drives can imitate an effect in the fitted part, but not in held-out phases.
@@ -188,7 +188,7 @@ fn cause<S: SideModel>(
 
 fn unknowns<S: SideModel>(fit: &SideFit) -> Vec<Unknown> {
     let covariance = fit.precision.clone().cholesky().map(|cholesky| cholesky.inverse());
-    let each = S::unknowns().iter().zip(&fit.hypothesis.nuisances).enumerate();
+    let each = S::UNKNOWNS.iter().zip(&fit.hypothesis.nuisances).enumerate();
     each.map(|(place, (unknown, z))| {
         let sigma = covariance.as_ref().map_or(1.0, |c| c[(place, place)].max(0.0).sqrt());
         let ends = |middle: f64, sigma: f64| {

@@ -68,7 +68,7 @@ type ErrorPrior = (f64, f64);
 impl<S: SideModel> SideProblem<'_, S> {
     /// The hypothesis without a cause.
     pub(crate) fn nothing(&self) -> Hypothesis {
-        Hypothesis { nuisances: vec![0.0; S::unknowns().len()], effects: Vec::new() }
+        Hypothesis { nuisances: vec![0.0; S::UNKNOWNS.len()], effects: Vec::new() }
     }
 
     /// Prior of the effects' coordinates: mean and precision. It is no wider than a parameter's range.
@@ -92,7 +92,7 @@ impl<S: SideModel> SideProblem<'_, S> {
             add(&mut rig, self.effects[*index].as_ref(), values).ok()?;
         }
         let unknowns: Vec<f64> =
-            S::unknowns().iter().zip(&hypothesis.nuisances).map(|(unknown, z)| unknown.at(*z)).collect();
+            S::UNKNOWNS.iter().zip(&hypothesis.nuisances).map(|(unknown, z)| unknown.at(*z)).collect();
         let predicted = self.side.predict(&rig, &unknowns);
         predicted.iter().flatten().all(|k| k.is_finite()).then_some(predicted)
     }
@@ -124,7 +124,7 @@ impl<S: SideModel> SideProblem<'_, S> {
         };
         let used = read.iter().zip(counts).map(|(read, counts)| *counts && read.is_finite());
         let rows = rows.t_s.iter().zip(used).map(|(t_s, used)| (*t_s, noise, used));
-        WhiteningFilter::new(rows, S::model_errors()[channel].correlation_s, 1.0, 1.0)
+        WhiteningFilter::new(rows, S::MODEL_ERRORS[channel].correlation_s, 1.0, 1.0)
     }
 
     /// The most probable model error of one channel, K; the misfit there, and the logarithm of the posterior's width.
@@ -158,7 +158,7 @@ impl<S: SideModel> SideProblem<'_, S> {
         residual: &Columns,
         prior: &dyn Fn(&ModelError) -> ErrorPrior,
     ) -> Vec<(f64, f64, f64)> {
-        let channels = residual.iter().zip(S::model_errors()).enumerate();
+        let channels = residual.iter().zip(S::MODEL_ERRORS).enumerate();
         channels
             .map(|(channel, (residual, error))| self.model_error(counts, channel, residual, prior(error)))
             .collect()

@@ -129,7 +129,7 @@ fn draws<S: SideModel>(problem: &SideProblem<'_, S>, fit: &SideFit, seed: u64) -
     let Some(cholesky) = fit.precision.clone().cholesky() else { return Vec::new() };
     let coordinates = coordinates(problem.effects, &fit.hypothesis);
     let mode = unknowns(&fit.hypothesis, &coordinates);
-    let (t_s, correlation_s) = (&problem.side.rows().t_s, S::model_errors()[0].correlation_s);
+    let (t_s, correlation_s) = (&problem.side.rows().t_s, S::MODEL_ERRORS[0].correlation_s);
     let numbers: Vec<u64> = (0..DRAWS as u64).collect();
     let drawn = parallel::map(&numbers, |number| {
         let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_mul(DRAWS as u64).wrapping_add(*number));

@@ -242,7 +242,7 @@ pub(crate) fn smallest<S: SideModel>(
             last_imitator = imitator;
             Some(sigma)
         })?;
-        let unknown = &S::unknowns()[last_imitator];
+        let unknown = &S::UNKNOWNS[last_imitator];
         let reason = format!(
             "even {} cannot be distinguished from another value of the unknown {} ({})",
             size_in_words(parameter, smallest.furthest),

@@ -41,13 +41,13 @@ pub(crate) trait SideModel: Sync + Sized {
     /// The pressure whose changes separate the phases of a log, in addition to the speed.
     const PRESSURE: Channel;
 
-    fn channels() -> SideChannels<'static>;
+    const CHANNELS: SideChannels<'static>;
 
     /// Unknown parameters that are fitted with or without a cause.
-    fn unknowns() -> &'static [Parameter];
+    const UNKNOWNS: &'static [Parameter];
 
     /// Model error of each judged channel.
-    fn model_errors() -> &'static [ModelError];
+    const MODEL_ERRORS: &'static [ModelError];
 
     fn of(rows: Rows) -> Self;
 

@@ -16,7 +16,7 @@ use std::f64::consts::LN_2;
 
 /// Unknowns, in the order of [`TurbineSide::predict`]: factors on the campaign's machine. The priors of heat transfer and housing are those of turbines of
 /// its size. Bound: published turbines of automotive size, and housings from bare to insulated, lie within two sigmas.
-static UNKNOWNS: [Parameter; 9] = [
+const UNKNOWNS: [Parameter; 9] = [
     normal("eta_t", "", 1.0, 0.1, "best turbine efficiency, over the declared one"),
     normal("u_c", "", 1.0, 0.08, "blade-speed ratio of the best efficiency, over the declared one"),
     normal("eta_t_ratio", "", 0.0, 0.05, "change of the efficiency per unit of the logarithm of P3/P4"),
@@ -42,7 +42,7 @@ static UNKNOWNS: [Parameter; 9] = [
 
 /// Errors of T4 (a parabola over the blade-speed ratio, at a drop of some hundred kelvin) and of Tt (one thermocouple for a whole housing).
 /// Judgement: medians of the residuals of good engine logs.
-static MODEL_ERRORS: [ModelError; 2] = [
+const MODEL_ERRORS: [ModelError; 2] = [
     ModelError { median_k: 0.45, width: 0.25, correlation_s: CORRELATION_S },
     ModelError { median_k: 8.0, width: 0.0, correlation_s: HOUSING_CORRELATION_S },
 ];
@@ -56,25 +56,16 @@ pub(crate) struct TurbineSide {
 impl SideModel for TurbineSide {
     const SIDE: Side = Side::Turbine;
     const PRESSURE: Channel = Channel::P3;
-
-    fn channels() -> SideChannels<'static> {
-        SideChannels {
-            drives: &[Channel::ShaftSpeed, Channel::TurbineFlow, Channel::P3, Channel::T3, Channel::P4],
-            judged: &[Channel::T4, Channel::Tt],
-            is_usable: |row| {
-                let [speed_rpm, flow_kg_s, p3_pa, _, p4_pa] = *row else { return false };
-                does_work(speed_rpm, flow_kg_s, p4_pa, p3_pa)
-            },
-        }
-    }
-
-    fn unknowns() -> &'static [Parameter] {
-        &UNKNOWNS
-    }
-
-    fn model_errors() -> &'static [ModelError] {
-        &MODEL_ERRORS
-    }
+    const UNKNOWNS: &'static [Parameter] = &UNKNOWNS;
+    const MODEL_ERRORS: &'static [ModelError] = &MODEL_ERRORS;
+    const CHANNELS: SideChannels<'static> = SideChannels {
+        drives: &[Channel::ShaftSpeed, Channel::TurbineFlow, Channel::P3, Channel::T3, Channel::P4],
+        judged: &[Channel::T4, Channel::Tt],
+        is_usable: |row| {
+            let [speed_rpm, flow_kg_s, p3_pa, _, p4_pa] = *row else { return false };
+            does_work(speed_rpm, flow_kg_s, p4_pa, p3_pa)
+        },
+    };
 
     fn of(rows: Rows) -> Self {
         TurbineSide { rows }

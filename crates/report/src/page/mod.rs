@@ -5,10 +5,7 @@
 //! number.
 
 pub(crate) mod drawn;
-mod live_page;
 pub(crate) mod run_page;
 pub(crate) mod widgets;
 
-pub use live_page::{
-    LiveMap, LivePoint, Planned, live_map, live_page, live_point, planned, target_line_name,
-};
+pub use run_page::{LiveMap, LivePoint, Planned, live_map, live_page, live_point, planned, target_line_name};

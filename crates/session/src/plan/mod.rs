@@ -3,4 +3,3 @@
 pub(crate) mod campaign_forecast;
 pub(crate) mod planning;
 pub(crate) mod rehearsal;
-pub(crate) mod scripted_steps;

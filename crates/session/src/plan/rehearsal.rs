@@ -1,7 +1,6 @@
 //! Rehearses a sequence script, or the jumps of a plan, on the nominal machine, so that errors never reach the rig.
 
-use crate::plan::planning::{add_surge_search, hash_inputs, plan};
-use crate::plan::scripted_steps::ScriptedSteps;
+use crate::plan::planning::{ScriptedSteps, add_surge_search, hash_inputs, plan};
 use crate::rig::drive::drive;
 use crate::{Session, SessionError};
 use mapper_campaign::Campaign;

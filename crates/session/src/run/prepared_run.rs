@@ -1,9 +1,8 @@
 //! A complete run: makes the plan, drives the rig, records, identifies, assembles the map, and writes the report.
 
 use crate::analysis::results::{Results, RunPart};
-use crate::plan::planning::{hash_inputs, hold_near_surge, nominal_model, plan, stored_plan};
+use crate::plan::planning::{ScriptedSteps, hash_inputs, hold_near_surge, nominal_model, plan, stored_plan};
 use crate::plan::rehearsal::rehearse;
-use crate::plan::scripted_steps::ScriptedSteps;
 use crate::recording::files::{PROGRAM, json_text, write_new};
 use crate::recording::identification_config::{declared, identification};
 use crate::recording::journal::{Entry, Identity, Journal, rig_sha256};

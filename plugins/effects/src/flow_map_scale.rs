@@ -19,8 +19,8 @@ mod tests {
     use super::*;
     use crate::testing::Instant;
     use mapper_core::ReferenceState;
-    use mapper_physics::compressor_map::closed_form_map::{CharacteristicPoint, CompressorCharacteristic};
     use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
+    use mapper_physics::compressor_map::closed_form_map::{CharacteristicPoint, CompressorCharacteristic};
 
     /// At 110 krpm the flow of best efficiency is below the flow of the point: more flow is less efficient, by the closed form's own
     /// parabola. A map with only speed lines gives the same to first order.

@@ -3,7 +3,7 @@
 use crate::virtual_lab::sensors::{Draws, LabElement, LabElements, SensorErrors, offset_kind, stream};
 use mapper_core::{BackendError, Channel, DeclaredElement, Element, with_unit};
 use mapper_physics::rig::backend_plugin::NominalRig;
-use mapper_physics::rig::effect::{Effect, EffectError, EffectParameter, Rig, self};
+use mapper_physics::rig::effect::{self, Effect, EffectError, EffectParameter, Rig};
 use mapper_yaml::units::{Duration, Kind, Length, Quantity, UnitError};
 use serde::Deserialize;
 use std::collections::BTreeMap;

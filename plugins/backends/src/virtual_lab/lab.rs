@@ -1,20 +1,23 @@
 //! The virtual gas stand: the lumped model behind actuators and sensors, in simulated time.
 
+use super::samples::{Instant, SampleCollector, SensorBank};
 use crate::setpoint_limits;
 use crate::virtual_lab::rig::actuator::Actuator;
-use crate::virtual_lab::rig::drift::LabDrift;
 use crate::virtual_lab::rig::drift;
+use crate::virtual_lab::rig::drift::LabDrift;
 use crate::virtual_lab::rig::running::{LabInputs, MIN_EXPANSION_RATIO, Resonator, RunningMachine};
 use crate::virtual_lab::sensors::{ElementBank, SecondOrderFollower, Sensor};
 use crate::virtual_lab::settings_file::{LabSettings, Start};
-use mapper_core::{Backend, BackendError, CHANNELS, Channel, Event, EventKind, GuardName, MODELLED_CHANNELS, RigDescription, RigMode, SafeTrajectory, SampleBatch, Setpoints};
-use mapper_physics::laws::housing::StandstillState;
+use mapper_core::{
+    Backend, BackendError, CHANNELS, Channel, Event, EventKind, GuardName, MODELLED_CHANNELS, RigDescription,
+    RigMode, SafeTrajectory, SampleBatch, Setpoints,
+};
 use mapper_physics::laws::housing;
+use mapper_physics::laws::housing::StandstillState;
 use mapper_physics::rig::instruments::ChannelFollower;
-use mapper_physics::simulation::steady::Inputs;
 use mapper_physics::simulation::model::{State, rad_s_of_rpm};
 use mapper_physics::simulation::simulate::{Crossing, ModelEvent, SimulationError, Watch};
-use super::samples::{Instant, SampleCollector, SensorBank};
+use mapper_physics::simulation::steady::Inputs;
 
 /// Shaft speed at which the running model takes over during a start, and ends during a stop, rpm.
 const CRANKING_SPEED_RPM: f64 = 5_000.0;

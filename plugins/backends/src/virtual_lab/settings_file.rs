@@ -1,6 +1,8 @@
 //! Settings of the virtual lab, and the file with them.
 
-use crate::virtual_lab::effects_file::{EffectValues, FaultFile, SettingProblem, apply_effects, check_range, read_elements};
+use crate::virtual_lab::effects_file::{
+    EffectValues, FaultFile, SettingProblem, apply_effects, check_range, read_elements,
+};
 use crate::virtual_lab::rig::actuator::ActuatorDynamics;
 use crate::virtual_lab::rig::drift::{DriftFile, LabDrift, Weather, draw_tolerances, read_drifts};
 use crate::virtual_lab::rig::running::{Lumped, Structure, SurgePrecursor};
@@ -11,7 +13,10 @@ use mapper_physics::rig::backend_plugin::NominalRig;
 use mapper_physics::rig::effect::Rig;
 use mapper_physics::rig::instruments::Instruments;
 use mapper_physics::simulation::model::Model;
-use mapper_yaml::units::{Conductance, Dimension, Duration, Fraction, Frequency, Length, PressureRate, Quantity, RatioRate, Speed, TemperatureRate};
+use mapper_yaml::units::{
+    Conductance, Dimension, Duration, Fraction, Frequency, Length, PressureRate, Quantity, RatioRate, Speed,
+    TemperatureRate,
+};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;

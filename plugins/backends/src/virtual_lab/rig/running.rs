@@ -1,14 +1,16 @@
 //! The running rig of the virtual lab, with the precursors of surge.
 
+use crate::virtual_lab::effects_file::NAME;
 use crate::virtual_lab::rig::actuator::{Actuator, ActuatorDynamics};
 use crate::virtual_lab::rig::drift::Weather;
-use crate::virtual_lab::effects_file::NAME;
 use mapper_physics::gas::air;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
-use mapper_physics::simulation::steady::Inputs;
 use mapper_physics::simulation::model::{Model, Outputs, State};
-use mapper_physics::simulation::simulate::{DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Simulator, Watch};
+use mapper_physics::simulation::simulate::{
+    DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Simulator, Watch,
+};
 use mapper_physics::simulation::steady;
+use mapper_physics::simulation::steady::Inputs;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;

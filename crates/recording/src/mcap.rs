@@ -12,8 +12,6 @@ use zstd::zstd_safe::{DCtx, ResetDirective, get_error_name};
 // Records of an MCAP file or chunk, one after the other, parsed without trusting any length. `mcap`'s own readers stop at the first fault, allocate a stated length (4 GB for a damaged string), and panic on a short attachment.
 // The numbers of a flat JSON message are read exactly, without building a tree.
 
-/// Kinds of records.
-
 /// Start of every MCAP file.
 pub(crate) const MAGIC: &[u8] = mcap::MAGIC;
 

@@ -40,6 +40,20 @@ impl Identified {
         self.json["points"].to_string()
     }
 
+    /// The turbine at the points.
+    #[getter]
+    fn turbine_points(&self) -> String {
+        self.json["turbine"].to_string()
+    }
+
+    /// The nodes of the fitted map of the turbine, as JSON; `null` without one.
+    #[getter]
+    fn turbine_map(&self) -> PyResult<String> {
+        let map = self.found.turbine_map();
+        let lines = map.and_then(|map| map.fitted).map(|fitted| fitted.lines);
+        Ok(serde_json::to_string(&lines).map_err(|error| Fault::from(SessionError::from(error)))?)
+    }
+
     /// The map of the points, with a fitted surface if there are enough of them.
     fn map(&self, py: Python<'_>) -> PyResult<Map> {
         let found = self.found.clone();

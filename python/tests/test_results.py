@@ -118,6 +118,22 @@ def test_a_campaign_replaces_one_that_cannot_be_read(command: Callable[..., Any]
     assert mapper.identify(recording).json == command("identify", alone, "--campaign", file)
 
 
+def test_the_turbine_has_its_power_over_that_of_an_ideal_one(run: mapper.Run) -> None:
+    """The efficiency is a power over `m cp T3' (1 - ER^-kappa)`; cp of air at 500 degC is 1.092 kJ/(kg K)."""
+    turbine = mapper.identify(run).turbine_points.dropna(subset="efficiency")
+    assert len(turbine) > 8
+    power_w = turbine["power_w"]
+    flow_kg_s = turbine["flow_parameter_kg_sqrt_k_s_kpa"] * 110.0 * turbine["expansion_ratio"] / 773.15**0.5
+    drop = 1.0 - turbine["expansion_ratio"] ** (-287.05 / 1092.0)
+    ideal_w = flow_kg_s * 1092.0 * turbine["t3_prime_k"] * drop
+    # P4 and T3 are their readings here, which differ from 110 kPa and 500 degC by their errors: some tenths of a per cent.
+    assert ((power_w / ideal_w / turbine["efficiency"] - 1.0).abs() < 0.02).all()
+    assert (turbine["efficiency_low"] < turbine["efficiency"]).all()
+    nodes = mapper.identify(run).turbine_map
+    inside = nodes[~nodes["extrapolated"]]
+    assert (inside["flow_low"] < inside["flow_parameter_kg_sqrt_k_s_kpa"]).all()
+
+
 def test_the_map_is_that_of_the_command(run: mapper.Run, command: Callable[..., Any], tmp_path: Path) -> None:
     command("identify", run.directory, "--out", tmp_path / "out")
     compressor_map = mapper.identify(run).map

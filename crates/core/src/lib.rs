@@ -33,6 +33,7 @@ pub use identification::thermal_model::{
     ConvectionLaw, CorrelatedPair, IdentifiedHousing, IdentifiedInlet, InletConvection, Origin, SharedValue,
     ThermalModel,
 };
+pub use identification::turbine_point::{TurbineCommonErrors, TurbineDoubt, TurbineHousing, TurbinePoint};
 pub use identification::warning::{
     Bound, CalibrationDefect, EndEvidence, EtaSignal, FitFailure, LeftOut, MapRegion, ModelDoubt,
     ModelEvidence, NoCompression, PoorFit, Scaled, SeenAtRest, StepConflict, SuspectedFault, Swapped, TooFew,

@@ -9,7 +9,7 @@ use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_physics::gas::air::Air;
 use mapper_physics::gas::mixture::Gas;
 use mapper_physics::gas::pressure_tap::static_to_total_pa;
-use mapper_physics::machine::params::{BearingParams, Params};
+use mapper_physics::machine::params::{BearingParams, Params, TurbineParams};
 use mapper_physics::rig::sensor_fault::ExactReadings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -76,6 +76,10 @@ pub struct IdentifyConfig {
     pub air: Air,
     /// The gas of the turbine.
     pub turbine_gas: Gas,
+    /// The turbine as declared: housing and wheel.
+    pub turbine: TurbineParams,
+    /// Inertia of the shaft, kg m2, > 0.
+    pub shaft_inertia_kgm2: f64,
     /// One standard deviation of the humidity of `air`, kg/kg: part of the intervals of the joint method.
     pub humidity_sigma_kg_kg: f64,
     /// Readings of an isothermal zero: gain errors count from there.
@@ -96,6 +100,8 @@ pub struct IdentifyConfig {
     pub inlet_tap: PressureTap,
     /// Type of the P2 tap.
     pub outlet_tap: PressureTap,
+    /// Type of the P3 tap.
+    pub turbine_inlet_tap: PressureTap,
     /// Declared uncertainty of the sensors, SI units. Missing channels count as exact.
     pub declared: BTreeMap<Channel, DeclaredUncertainty>,
     /// Their offsets before an isothermal zero, one standard deviation; empty without one.
@@ -129,6 +135,8 @@ impl Default for IdentifyConfig {
             reference: ReferenceState::SAE,
             air: Air::PAPER,
             turbine_gas: Gas::CLOSED_FORM_AIR,
+            turbine: Params::default().turbine,
+            shaft_inertia_kgm2: Params::default().shaft_inertia_kgm2,
             humidity_sigma_kg_kg: 0.0,
             exact_at: ExactReadings::default(),
             valve_play_ratio: 0.0,
@@ -138,6 +146,7 @@ impl Default for IdentifyConfig {
             housing_contact_sigma_ratio: 0.0,
             inlet_tap: PressureTap::Total,
             outlet_tap: PressureTap::Total,
+            turbine_inlet_tap: PressureTap::Total,
             declared: BTreeMap::new(),
             offsets_before_zero: BTreeMap::new(),
             noise_colour: NoiseColour::default(),
@@ -163,7 +172,7 @@ impl IdentifyConfig {
             positive("time_constant_s", colour.time_constant_s, "a positive time, s"),
             share("first_order_share_ratio", colour.first_order_share_ratio),
         ];
-        for tap in [self.inlet_tap, self.outlet_tap] {
+        for tap in [self.inlet_tap, self.outlet_tap, self.turbine_inlet_tap] {
             if let PressureTap::Static { pipe_diameter_m } = tap {
                 checks.push(positive("pipe_diameter_m", pipe_diameter_m, "a positive diameter, m"));
             }

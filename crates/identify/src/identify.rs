@@ -10,8 +10,9 @@ use crate::needs::missing;
 use crate::points::points_with_budgets;
 use crate::single_step::dynamic::FittedReadings;
 use crate::step_data::humidity::with_measured_humidity;
+use crate::turbine::turbine_points;
 use crate::{IdentifyConfig, IdentifyError, StepError};
-use mapper_core::{IdentifiedPoint, PointBudgets, Recording, ThermalModel};
+use mapper_core::{IdentifiedPoint, PointBudgets, Recording, ThermalModel, TurbineHousing, TurbinePoint};
 
 /// Identifies every step of a recording, in order. Steps without a known position on the map are left out; [`identify_each`] names them with
 /// the reason.
@@ -54,6 +55,10 @@ pub struct Identified {
     pub budgets: Vec<PointBudgets>,
     /// Each step, by its index, with the readings that the fit predicts.
     pub fitted: Vec<(usize, Vec<FittedReadings>)>,
+    /// The turbine at the points whose turbine side was measured.
+    pub turbine: Vec<TurbinePoint>,
+    /// The heat balance of the turbine housing.
+    pub turbine_housing: Option<TurbineHousing>,
 }
 
 /// Like [`identify_each`], with the shared parameters of the points (joint method alone). Compared with a declared rig, if one is given: points
@@ -76,7 +81,11 @@ pub fn identify_recording(
     let estimated = Estimated::of(evidence, recording, config, nominal.as_ref());
     let Estimated { steps, estimates, thermal, dynamic, faults, detectable } = estimated;
     let (points, budgets) = points_with_budgets(recording, steps, &estimates, config);
+    let of_steps = points.iter().zip(&estimates);
+    let with_errors =
+        of_steps.filter_map(|(point, estimate)| Some((point.as_ref().ok()?, estimate.eta_errors.as_slice())));
+    let (turbine, turbine_housing) = turbine_points(recording, with_errors, config);
     let fits = estimates.into_iter().map(|estimate| estimate.fitted);
     let fitted = recording.steps.iter().map(|step| step.index).zip(fits).collect();
-    Ok(Identified { points, thermal, dynamic, faults, detectable, budgets, fitted })
+    Ok(Identified { points, thermal, dynamic, faults, detectable, budgets, fitted, turbine, turbine_housing })
 }

@@ -1,7 +1,7 @@
 //! Identifies points from a recording: efficiency and heat-transfer coefficient, with their uncertainty.
 //!
 //! [`identify_recording`] is a function from a [`Recording`](mapper_core::Recording) to points, one for each step. This crate has no access to
-//! a simulator's true values. Its stages (1 to 3 make the `evidence`, 3 to 5 the `estimates`, 6 the `points`):
+//! a simulator's true values. Its stages (1 to 3 make the `evidence`, 3 to 5 the `estimates`, 6 the `points`, 7 the `turbine`):
 //!
 //! 1. Every step gets its end state, the mean over its last seconds; [`isothermal_zero()`] has determined the offsets to subtract before.
 //! 2. Every step is fitted alone: `dynamic` finds the efficiency and the h whose T2, by eqs. 1-3, is closest to the measured one (Burke et al.,
@@ -12,6 +12,7 @@
 //!    Errors that are not estimated, offsets and gains, are carried into the intervals.
 //! 5. The smoothness of the map over speed corrects offsets that a zero did not remove.
 //! 6. Every point gets an interval with its budget by source, a verdict and its reasons.
+//! 7. The powers of compressor and shaft give the turbine's efficiency at the same points.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -31,6 +32,7 @@ mod reduce;
 mod single_step;
 mod step_data;
 mod step_outcome;
+mod turbine;
 
 pub use blade_count::{BladeCount, blade_count};
 pub use config::{

@@ -3,7 +3,7 @@
 use crate::campaign::Campaign;
 use crate::error::Error;
 use crate::recording::Recording;
-use mapper_core::{CompressorMap, IdentifiedPoint, Method, ResultRemark};
+use mapper_core::{CompressorMap, IdentifiedPoint, Method, ResultRemark, TurbineMap, TurbinePoint};
 use mapper_report::{Message, with_messages};
 use mapper_session::{Identified, Recorded, Session, SessionError, compressor_map};
 use serde_json::Value;
@@ -101,6 +101,16 @@ impl Identification {
         let mut remarks = Vec::new();
         let map = compressor_map(&self.machine, &self.details, &mut remarks);
         map.ok_or_else(|| SessionError::NoMap(remarks_text(&remarks)).into())
+    }
+
+    /// The turbine at the points whose turbine side was measured.
+    pub fn turbine_points(&self) -> impl Iterator<Item = &TurbinePoint> {
+        self.details.turbine.iter().map(|scored| &scored.point)
+    }
+
+    /// The map of the turbine, with a fitted surface; `None` with fewer than four usable points.
+    pub fn turbine_map(&self) -> Option<TurbineMap> {
+        self.details.turbine_map(&self.machine)
     }
 
     /// The object that `mapper identify --json` prints.

@@ -142,7 +142,7 @@ pub use identification::{Identification, identify};
 pub use mapper_core::{
     Backend, Channel, Clock, CompressorMap, Event, EventKind, IdentifiedPoint, Jump, MapFormat, Method,
     OperatingPoint, PacedClock, Plan, PlanStep, ReferenceState, RigDescription, RunEnding, SampleBatch,
-    Series, Setpoints, StepMarker, UnpacedClock, Verdict, Warning, step_number,
+    Series, Setpoints, StepMarker, TurbineMap, TurbinePoint, UnpacedClock, Verdict, Warning, step_number,
 };
 pub use mapper_diagnose::gap::CorrectedMap;
 pub use mapper_physics::rig::backend_plugin::BackendPlugin;

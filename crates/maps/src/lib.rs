@@ -19,5 +19,5 @@ pub use compare::{
 pub use map_fit::{MapFit, MapFitError, MapFitOptions, NearestPlace, fit_map, leave_out};
 pub use turbine::turbine_compare::{TurbineComparison, TurbinePointComparison, compare_turbines};
 pub use turbine::turbine_fit::{
-    ReducedTurbinePoint, TurbineFit, TurbineFitError, fit_turbine, reduce_turbine,
+    ReducedTurbinePoint, TurbineFit, TurbineFitError, fit_turbine, identified_turbine_map, reduce_turbine,
 };

@@ -1,6 +1,6 @@
 //! Damped least squares: step control, descent, and the arrow structure.
 //!
-//! [`descent`] is the fit of a model whose runs are costly: undamped steps within bounds, shortened if they do not help.
+//! [`descend`] is the fit of a model whose runs are costly: undamped steps within bounds, shortened if they do not help.
 //!
 //! The caller defines the problem: residuals, weights, bounds, and estimates between the steps. docs/decisions/0010-numerics.md gives
 //! the reasons for not using a library.

@@ -10,7 +10,9 @@ use crate::samples::series_builder::run_time_s;
 use crate::scan::scan;
 use crate::topics::{METADATA_NAME, START_KEY, TRUTH_TOPIC};
 use crate::{ReadOptions, ReadWarning, RecordError};
-use mapper_core::{Channel, IdentifiedPoint, Recording, ReferenceState, StepMarker, SurgeMark, TruthColumn};
+use mapper_core::{
+    Channel, IdentifiedPoint, Recording, ReferenceState, StepMarker, SurgeMark, TruthColumn, TurbinePoint,
+};
 use mapper_numerics::statistics::{mean, median};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -89,9 +91,39 @@ pub fn score(truth: &Truth, steps: &[StepMarker], points: Vec<IdentifiedPoint>) 
 
 /// Truth at the last sample at or before `t_s`.
 fn truth_at(truth: &Truth, t_s: f64) -> Option<PointTruth> {
-    let index = truth.t_s.partition_point(|sample_s| *sample_s <= t_s).checked_sub(1)?;
-    let value = |name: &str| truth.column(name)?.get(index).copied().filter(|value| value.is_finite());
+    let value = |name: &str| true_value(truth, t_s, name);
     Some(PointTruth { eta: value("eta")?, h_w_m2k: value("h_w_m2k")? })
+}
+
+/// A true quantity at the last sample at or before `t_s`.
+fn true_value(truth: &Truth, t_s: f64, name: &str) -> Option<f64> {
+    let index = truth.t_s.partition_point(|sample_s| *sample_s <= t_s).checked_sub(1)?;
+    truth.column(name)?.get(index).copied().filter(|value| value.is_finite())
+}
+
+/// The turbine at a point with its truth, if there is one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScoredTurbinePoint {
+    /// The turbine.
+    #[serde(flatten)]
+    pub point: TurbinePoint,
+    /// True efficiency of turbine and bearings, fraction; `None` on a real rig.
+    pub truth_efficiency: Option<f64>,
+}
+
+/// Pairs turbine points with the truth of their recording.
+pub fn score_turbine(
+    truth: &Truth,
+    steps: &[StepMarker],
+    points: Vec<TurbinePoint>,
+) -> Vec<ScoredTurbinePoint> {
+    let scored = |point: TurbinePoint| {
+        let marker = steps.iter().find(|marker| marker.index == point.step);
+        let truth_efficiency =
+            marker.and_then(|marker| true_value(truth, marker.end_s, "turbine_efficiency"));
+        ScoredTurbinePoint { point, truth_efficiency }
+    };
+    points.into_iter().map(scored).collect()
 }
 
 /// A surge mark with its truth, if there is one.

@@ -19,6 +19,7 @@ mod point_results;
 mod side_diagnosis;
 mod test_report;
 mod thermal_model;
+mod turbine;
 
 pub use diagnosis::drift::corrected_csv;
 pub use diagnosis::gap_results::{correction, forecast_check};
@@ -46,4 +47,5 @@ pub use side_diagnosis::why_figure;
 pub use test_report::key_figures::{PointsOrigin, first_campaign};
 pub use test_report::run_report::{ReportSource, RunReport, instant};
 pub use test_report::zero_and_sensors::SurgeReport;
-pub use thermal_model::{ThermalExport, TurbinePoint, turbine_points, turbine_text};
+pub use thermal_model::ThermalExport;
+pub use turbine::turbine_figure;

@@ -65,7 +65,7 @@ pub fn error_figure(machine: &str, points: &[ScoredPoint]) -> Option<Figure> {
 }
 
 /// Adds the good and the doubtful points to a panel.
-fn add_by_verdict(panel: &mut Panel, points: &[(Verdict, ScatterPoint)]) {
+pub(crate) fn add_by_verdict(panel: &mut Panel, points: &[(Verdict, ScatterPoint)]) {
     for (verdict, colour, marker, name) in [
         (Verdict::Good, palette::BLUE, Marker::Circle, "good"),
         (Verdict::Doubtful, palette::VERMILLION, Marker::Diamond, "doubtful"),

@@ -1,25 +1,17 @@
-//! The parameters that the points of a campaign share, and the turbine of a compressor test, for people and for other programs.
-//!
-//! Limits of the turbine: one row a step, at its end. Efficiency is the power of the compressor over the isentropic power of the turbine, total
-//! to static. It includes the bearing loss, and the heat that the gas loses to the turbine housing before the wheel counts as loss. A
-//! housing that still warms up lowers it. Shaft acceleration is not corrected for: the speed has settled. Expansion is from
-//! the total inlet pressure to the outlet pressure as tapped.
+//! The parameters that the points of a campaign share, for people and for other programs.
 
 use crate::document::{Describe, Document};
 use crate::formatting::{Message, significant_digits};
 use mapper_core::{
-    Channel, ConvectionLaw, IdentifiedInlet, IdentifiedPoint, InletConvection, Origin, Recording,
-    SharedValue, ThermalModel, half_width_95, one_line,
+    ConvectionLaw, IdentifiedInlet, InletConvection, Origin, SharedValue, ThermalModel, TurbineHousing,
+    half_width_95,
 };
-use mapper_observe::energy_balance::Gases;
-use mapper_physics::gas::air::{Air, viscosity_pa_s};
-use mapper_physics::laws::compression::{compressed_k, isentropic_rise_ratio};
+use mapper_physics::gas::air::viscosity_pa_s;
 use mapper_physics::laws::convection::coefficient_w_m2k;
 use mapper_physics::laws::housing::{bearing_conductance_w_k, compressor_capacity_j_k, turbine_capacity_j_k};
 use mapper_physics::machine::params::Params;
 use serde::Serialize;
 use serde_json::json;
-use std::fmt::Write;
 
 /// One row for each number, and sentences on the fit.
 impl Describe for ThermalModel {
@@ -130,6 +122,8 @@ pub struct ThermalExport<'a> {
     pub params: &'a Params,
     /// Result of a joint identification; `None` reports the declared values instead.
     pub found: Option<&'a ThermalModel>,
+    /// The identified balance of the turbine housing.
+    pub turbine_housing: Option<&'a TurbineHousing>,
 }
 
 /// The convection law where it is known best, with all that is needed to draw from it.
@@ -197,6 +191,7 @@ impl ThermalExport<'_> {
         let mut file = json!({
             "machine": self.machine,
             "identified": self.found,
+            "turbine_housing": self.turbine_housing,
             "declared": {
                 "nusselt_law": "Nu = a Re^b Pr^(1/3) (mu/mu_wall)^0.14, Re = 4 m/(pi D mu)",
                 "nusselt_coefficient": compressor.nusselt_coefficient,
@@ -227,92 +222,6 @@ impl ThermalExport<'_> {
         bytes.push(b'\n');
         Ok(bytes)
     }
-}
-
-/// Time before a step's end over which the turbine's channels are averaged, s.
-const AVERAGE_S: f64 = 10.0;
-
-/// The turbine at the end of a step.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct TurbinePoint {
-    /// Index of the step, from 0; files have its number, from 1.
-    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
-    pub step: usize,
-    /// Speed over the root of the inlet temperature, rpm/K^0.5.
-    pub speed_parameter_rpm_sqrt_k: f64,
-    /// Flow parameter `m sqrt(T3)/P3`, kg K^0.5/(s kPa).
-    pub flow_parameter_kg_sqrt_k_s_kpa: f64,
-    /// Expansion ratio P3/P4.
-    pub expansion_ratio: f64,
-    /// Turbine times mechanical efficiency, fraction; `None` if the compressor's efficiency is unknown.
-    pub efficiency: Option<f64>,
-}
-
-/// The turbine results of every point whose channels are present and plausible; the compressor's gas has the definition of the points'
-/// efficiency.
-pub fn turbine_points(recording: &Recording, points: &[IdentifiedPoint], gases: &Gases) -> Vec<TurbinePoint> {
-    points.iter().filter_map(|point| turbine_point(recording, point, gases)).collect()
-}
-
-fn turbine_point(recording: &Recording, point: &IdentifiedPoint, gases: &Gases) -> Option<TurbinePoint> {
-    let step = recording.steps.iter().find(|step| step.index == point.step)?;
-    let mean = |channel: Channel| {
-        let (_, values) = recording.series.get(&channel)?.slice(step.end_s - AVERAGE_S, step.end_s);
-        let sum: f64 = values.iter().sum();
-        let mean = sum / values.len() as f64;
-        (mean.is_finite() && mean > 0.0).then_some(mean)
-    };
-    let (flow_kg_s, p3_pa, t3_k, p4_pa) =
-        (mean(Channel::TurbineFlow)?, mean(Channel::P3)?, mean(Channel::T3)?, mean(Channel::P4)?);
-    let expansion_ratio = p3_pa / p4_pa;
-    if !(expansion_ratio > 1.0 && point.speed_rpm > 0.0) {
-        return None;
-    }
-    let cp3_j_kgk = gases.turbine.heat_capacity_j_kgk(t3_k);
-    let exponent = gases.turbine.gas_constant_j_kgk / cp3_j_kgk;
-    let turbine_w = flow_kg_s * cp3_j_kgk * t3_k * (1.0 - expansion_ratio.powf(-exponent));
-    let compressor_w = point.eta.filter(|eta| *eta > 0.0).map(|eta| {
-        let air = gases.compressor.between(point.p1_pa, point.pressure_ratio * point.p1_pa);
-        let rise = isentropic_rise_ratio(point.pressure_ratio, point.t1_k, air);
-        let t2_prime_k = compressed_k(point.t1_k, rise, eta, air);
-        point.flow_kg_s * air.enthalpy_rise_j_kg(point.t1_k, t2_prime_k)
-    });
-    Some(TurbinePoint {
-        step: point.step,
-        speed_parameter_rpm_sqrt_k: point.speed_rpm / t3_k.sqrt(),
-        flow_parameter_kg_sqrt_k_s_kpa: flow_kg_s * t3_k.sqrt() / (p3_pa / 1000.0),
-        expansion_ratio,
-        efficiency: compressor_w.map(|power_w| power_w / turbine_w).filter(|e| e.is_finite()),
-    })
-}
-
-/// SAE text, turbine: `SP mfp ER Eff`, in order of speed parameter.
-pub fn turbine_text(machine: &str, gases: &Gases, points: &[TurbinePoint]) -> String {
-    let mut rows: Vec<(&TurbinePoint, f64)> =
-        points.iter().filter_map(|p| Some((p, p.efficiency?))).collect();
-    rows.sort_by(|a, b| a.0.speed_parameter_rpm_sqrt_k.total_cmp(&b.0.speed_parameter_rpm_sqrt_k));
-    let mut text = format!(
-        "# turbine of {}\n\
-         # Eff: compressor power over isentropic turbine power, total to static: mechanical loss and heat lost before the\n\
-         # wheel are in it; too low where the turbine housing still warms up.\n\
-         # Gas of the turbine: {}; of the compressor: {}.\n",
-        one_line(machine),
-        Air::new(gases.turbine, 0.0).description(),
-        gases.compressor.description(),
-    );
-    let without = points.len() - rows.len();
-    if without > 0 {
-        let _ = writeln!(text, "# {without} points without a compressor efficiency are omitted");
-    }
-    text.push_str("# SP(rpm/sqrt(K)) mfp(kg-sqrt(K)/s-kPa) ER Eff\n");
-    for (p, efficiency) in rows {
-        let _ = writeln!(
-            text,
-            "{} {} {} {efficiency}",
-            p.speed_parameter_rpm_sqrt_k, p.flow_parameter_kg_sqrt_k_s_kpa, p.expansion_ratio
-        );
-    }
-    text
 }
 
 #[cfg(test)]
@@ -399,7 +308,7 @@ mod tests {
     #[test]
     fn declared_values_are_exported_with_those_that_follow_from_them() {
         let params = Params::default();
-        let export = ThermalExport { machine: "a\nb 7", params: &params, found: None };
+        let export = ThermalExport { machine: "a\nb 7", params: &params, found: None, turbine_housing: None };
         let value: serde_json::Value = serde_json::from_slice(&export.json().unwrap()).unwrap();
         // Appendix A: 2 k A / L = 2 * 47.5 * 7e-4 / 45e-3 = 1.478 W/K; 0.93 kg * 945 J/(kg K) at 350 K.
         let declared = |name: &str| value["declared"][name].as_f64().unwrap();

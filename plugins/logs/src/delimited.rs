@@ -2,8 +2,8 @@
 
 use crate::clock::HEAD_ROWS;
 use crate::tables::long_table::{LongForm, LongRows};
-use crate::tables::table_row::RowStream;
 use crate::tables::table_log::{Origin, Table};
+use crate::tables::table_row::RowStream;
 use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink};
 use mapper_table::{Dialect, SEPARATORS, TextEncoding, decimal_sign, detect_text};
 

@@ -42,6 +42,28 @@ class Result:
         return _tables.table(self._points, "step", _tables.POINT)
 
     @property
+    def turbine_points(self) -> pd.DataFrame:
+        """The turbine at the points whose turbine side was measured, by the number of their step; empty without such points.
+
+        ``efficiency`` is turbine times mechanical efficiency, total to static, fraction, with its 95 % interval. Speed and flow are reduced by
+        the total state at the inlet: rpm/K^0.5 and kg K^0.5/(s kPa).
+        """
+        rows = json.loads(self._inner.turbine_points)
+        kept = [
+            {name: value for name, value in row.items() if name not in ("budget", "common", "doubts")} for row in rows
+        ]
+        return _tables.table(kept, "step")
+
+    @property
+    def turbine_map(self) -> pd.DataFrame:
+        """The fitted map of the turbine, a row per node with 95 % intervals; empty with fewer than four usable points."""
+        lines = json.loads(self._inner.turbine_map) or []
+        nodes = [
+            {**{k: v for k, v in line.items() if k != "nodes"}, **node} for line in lines for node in line["nodes"]
+        ]
+        return _tables.table(nodes)
+
+    @property
     def remarks(self) -> list[str]:
         """Remarks of the identification, and warnings of the reader."""
         return [*self.json["recording_warnings"], *(remark["message"] for remark in self.json["remarks"])]

@@ -14,6 +14,7 @@ use xtask::constants;
 /// Generated files and folders below docs.
 const GENERATED: &[&str] = &[
     "images/plan.svg",
+    "images/turbine.svg",
     "images/turbo_a.svg",
     "reference/campaign.md",
     "reference/cli.md",
@@ -135,7 +136,7 @@ fn command_line(programs: &Programs) -> Result<String, Error> {
     Ok(text)
 }
 
-/// The picture of the plan, and the map, of the shipped campaign.
+/// The picture of the plan, and the maps of compressor and turbine, of the shipped campaign.
 fn mapped(programs: &Programs, made: &Path) -> Result<(), Error> {
     let runs = workspace::target_dir().join("xtask-docs-runs");
     files::remove(&runs)?;
@@ -144,8 +145,10 @@ fn mapped(programs: &Programs, made: &Path) -> Result<(), Error> {
     output(command(&programs.mapper, &["plan", SHIPPED, "--svg", &plan.to_string_lossy()]))?;
     run(command(&programs.mapper, &["run", SHIPPED, "--out", &runs.to_string_lossy()]))?;
     for run in files::entries(&runs)? {
-        let map = run.join("map.svg");
-        write(&made.join("images/turbo_a.svg"), &fs::read(&map).map_err(at(&map))?)?;
+        for (picture, image) in [("map.svg", "turbo_a.svg"), ("turbine_map.svg", "turbine.svg")] {
+            let picture = run.join(picture);
+            write(&made.join("images").join(image), &fs::read(&picture).map_err(at(&picture))?)?;
+        }
     }
     Ok(())
 }
@@ -184,7 +187,7 @@ fn build() -> Result<(), Error> {
         "--workspace",
         "--all-features",
         "--test",
-        "turbine",
+        "reference_pages",
         "--bin",
         "mapper",
     ];

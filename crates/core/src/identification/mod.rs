@@ -3,4 +3,5 @@
 pub(crate) mod identified;
 pub(crate) mod settings;
 pub(crate) mod thermal_model;
+pub(crate) mod turbine_point;
 pub(crate) mod warning;

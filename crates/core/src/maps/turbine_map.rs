@@ -3,9 +3,6 @@
 use crate::{ImportRemark, ImportedColumn, MeasuredTurbinePoint};
 use serde::{Deserialize, Serialize};
 
-/// Ratio of the speeds of two points of one line. Bound: it varies by 1 %, and lines of maps are at least 5 % apart.
-const SAME_LINE_RATIO: f64 = 1.015;
-
 /// One point of a turbine map. Speed and flow are reduced by the state at the inlet, so they need no reference state.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TurbineMapPoint {
@@ -98,11 +95,14 @@ impl From<TurbineMap> for ImportedTurbine {
 }
 
 impl TurbineMap {
+    /// Ratio of the speeds of two points of one line. Bound: it varies by 1 %, and lines of maps are at least 5 % apart.
+    pub const SAME_LINE_RATIO: f64 = 1.015;
+
     /// The speed lines: points of one vane position whose speeds differ by less than 1.5 %, as lines of compressor maps.
     pub fn lines(&self) -> impl Iterator<Item = &[TurbineMapPoint]> {
         self.points.chunk_by(|a, b| {
             a.vane_position == b.vane_position
-                && b.speed_parameter_rpm_sqrt_k <= SAME_LINE_RATIO * a.speed_parameter_rpm_sqrt_k
+                && b.speed_parameter_rpm_sqrt_k <= TurbineMap::SAME_LINE_RATIO * a.speed_parameter_rpm_sqrt_k
         })
     }
 }

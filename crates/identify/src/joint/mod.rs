@@ -164,6 +164,7 @@ pub(crate) fn estimate(
             ln_h_rows.into_iter().map(|row| uncertainty::in_unit(row, h_w_m2k, "W/(m2 K)")).collect();
         estimates[step.position] = Estimate {
             budgets: [eta_rows, h_rows],
+            eta_errors: numbers.eta_errors[i].clone(),
             eta: Some((eta, Some(eta_error))),
             h_w_m2k: Some((h_w_m2k, Some(h_error))),
             intervals: Some([

@@ -7,12 +7,13 @@ use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::fit::step_noise;
 use crate::joint::step_model::parameters::{
-    BAROMETER, ETA, EXPONENT, FLOW_GAIN, GAINS, HOUSING, HUMIDITY, INLET, LN_AREA, LN_COEFFICIENT,
-    LN_DEVIATION, LOCAL, OFFSET_CHANNELS, OFFSETS, PREHEAT, PROBE_MM2, REFINEMENTS, SHARED, SURFACE, TC_LAG,
-    THERMOMETERS, symbol,
+    BAROMETER, ETA, EXPONENT, FLOW_GAIN, GAIN_CHANNELS, GAINS, HOUSING, HUMIDITY, INLET, LN_AREA,
+    LN_COEFFICIENT, LN_DEVIATION, LOCAL, OFFSET_CHANNELS, OFFSETS, PREHEAT, PROBE_MM2, REFINEMENTS, SHARED,
+    SURFACE, TC_LAG, THERMOMETERS, symbol,
 };
 use crate::joint::step_model::rows::StepRows;
 use crate::single_step::budgets;
+use crate::single_step::dynamic::ReadingError;
 use mapper_core::{BudgetRow, Channel, EstimateUncertainty, confidence_interval_95};
 use mapper_inference::mixture::MIN_WEIGHT;
 use mapper_numerics::parallel;
@@ -129,6 +130,12 @@ impl Sources<'_, '_> {
             .collect()
     }
 
+    /// Change of a number by one standard deviation of each error of readings that a turbine point depends on as well.
+    fn by_reading(&self, quantity: &Quantity) -> Vec<(ReadingError, f64)> {
+        let of_reading = |(index, change)| Some((reading_error(index)?, change));
+        self.by_prior(quantity).into_iter().filter_map(of_reading).collect()
+    }
+
     /// Variance by the declared errors of the readings.
     pub(crate) fn bias_variance(&self, quantity: &Quantity) -> f64 {
         let errors = self.by_prior(quantity).into_iter().filter(|(index, _)| is_error(*index));
@@ -203,6 +210,15 @@ pub(crate) fn in_unit(row: BudgetRow, number: f64, unit: &str) -> BudgetRow {
     }
 }
 
+fn reading_error(index: usize) -> Option<ReadingError> {
+    match index {
+        BAROMETER => Some(ReadingError::Barometer),
+        FLOW_GAIN => Some(ReadingError::Gain(Channel::CompressorFlow)),
+        GAINS..BAROMETER => GAIN_CHANNELS.get(index - GAINS).copied().map(ReadingError::Gain),
+        _ => OFFSET_CHANNELS.get(index.wrapping_sub(OFFSETS)).copied().map(ReadingError::Offset),
+    }
+}
+
 /// Unit of a parameter.
 fn unit(index: usize) -> &'static str {
     match index {
@@ -236,6 +252,8 @@ pub(crate) struct Numbers {
     pub(crate) common: [Vec<Vec<f64>>; 2],
     /// Sources of the uncertainty of each point's efficiency and of its ln h.
     pub(crate) budgets: Vec<[Vec<BudgetRow>; 2]>,
+    /// Change of each point's efficiency by one standard deviation of the errors of readings.
+    pub(crate) eta_errors: Vec<Vec<(ReadingError, f64)>>,
 }
 
 impl Numbers {
@@ -271,7 +289,8 @@ impl Numbers {
             changes
         });
         let budgets = eta_rows.into_iter().zip(ln_h_rows).map(|(eta, ln_h)| [eta, ln_h]).collect();
-        Numbers { eta, ln_h, common, budgets }
+        let eta_errors = etas.iter().map(|quantity| sources.by_reading(quantity)).collect();
+        Numbers { eta, ln_h, common, budgets, eta_errors }
     }
 
     /// Median standard error of the efficiencies, fraction; infinite without any.

@@ -27,6 +27,8 @@ pub(crate) struct Estimate {
     pub(crate) intervals: Option<[(f64, f64); 2]>,
     /// Effect of the points' common errors on eta and h: see [`CommonErrors`](mapper_core::CommonErrors).
     pub(crate) common: [Vec<f64>; 2],
+    /// Change of eta by one standard deviation of the errors of readings that it depends on; empty if the method does not separate them.
+    pub(crate) eta_errors: Vec<(ReadingError, f64)>,
     /// Sources of the uncertainty of eta and h; empty if the method does not separate them.
     pub(crate) budgets: [Vec<BudgetRow>; 2],
     pub(crate) window: Option<Window>,
@@ -35,6 +37,14 @@ pub(crate) struct Estimate {
     pub(crate) dtc_k: Option<f64>,
     /// Readings that the method predicts; empty if it predicts none.
     pub(crate) fitted: Vec<FittedReadings>,
+}
+
+/// An error of readings that may also move the identified efficiency.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum ReadingError {
+    Offset(Channel),
+    Gain(Channel),
+    Barometer,
 }
 
 /// Readings of a channel over the window of a step, and the same by the fit that gave the point.

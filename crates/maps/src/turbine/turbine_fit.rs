@@ -8,7 +8,7 @@ use crate::table::reduced_turbine_point;
 use crate::turbine::turbine_surface::{Observation, Place, Surface, Term};
 use mapper_core::{
     Channel, DeclaredUncertainty, FittedTurbine, FittedTurbineLine, FittedTurbineNode, MeasuredTurbinePoint,
-    TurbineMap, TurbineMapPoint,
+    TurbineCommonErrors, TurbineMap, TurbineMapPoint, TurbinePoint, Verdict,
 };
 use mapper_numerics::statistics::range;
 use mapper_physics::gas::air::Air;
@@ -50,6 +50,9 @@ const USUAL_GAS_K: f64 = 873.15;
 const MIN_POINTS: usize = 4;
 /// Nodes over the expansion ratio. Bound: finer than the measured points.
 const NODES: usize = 21;
+
+/// Relative step of the derivative by the expansion ratio. Bound: between rounding and curvature.
+const RATIO_STEP: f64 = 1e-6;
 
 /// Why a turbine map cannot be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -98,12 +101,31 @@ fn efficiency_place(vane_position: f64, speed: f64, expansion_ratio: f64) -> Pla
     [vane_position, speed, speed / drop.sqrt()]
 }
 
+/// Changes of the flow's logarithm at the same expansion ratio: a wrong ratio moves the point along the curve.
+fn flow_changes(errors: &TurbineCommonErrors, expansion_ratio: f64) -> Vec<f64> {
+    let slope = (nozzle(expansion_ratio * (1.0 + RATIO_STEP)) - nozzle(expansion_ratio)) / RATIO_STEP;
+    let changes = errors.ln_flow_changes.iter().zip(&errors.ln_expansion_ratio_changes);
+    changes.map(|(ln_flow, ln_ratio)| ln_flow - slope * ln_ratio).collect()
+}
+
 impl TurbineFit {
     /// Fits a map.
     ///
     /// # Errors
     /// [`TurbineFitError`].
     pub fn new(map: &TurbineMap) -> Result<TurbineFit, TurbineFitError> {
+        TurbineFit::with_common_errors(map, &[])
+    }
+
+    /// Fits a map whose points share errors, one for each point in order; none if empty.
+    ///
+    /// # Errors
+    /// [`TurbineFitError`].
+    pub fn with_common_errors(
+        map: &TurbineMap,
+        common: &[&TurbineCommonErrors],
+    ) -> Result<TurbineFit, TurbineFitError> {
+        let mut common = common.iter();
         let mut flow = Vec::new();
         let mut efficiency = Vec::new();
         let mut ends = Vec::new();
@@ -111,9 +133,12 @@ impl TurbineFit {
             for point in points {
                 let (speed, ratio) = (point.speed_parameter_rpm_sqrt_k, point.expansion_ratio);
                 let value = point.flow_parameter_kg_sqrt_k_s_kpa.ln() - nozzle(ratio);
-                flow.push(Observation { place: flow_place(vane(point), speed, ratio), value, line });
+                let errors = common.next();
+                let changes = errors.map_or_else(Vec::new, |errors| flow_changes(errors, ratio));
+                flow.push(Observation { place: flow_place(vane(point), speed, ratio), value, line, changes });
                 let place = efficiency_place(vane(point), speed, ratio);
-                efficiency.extend(point.efficiency.map(|value| Observation { place, value, line }));
+                let changes = errors.map_or_else(Vec::new, |errors| errors.efficiency_changes.clone());
+                efficiency.extend(point.efficiency.map(|value| Observation { place, value, line, changes }));
             }
             ends.extend(line_ends(points));
         }
@@ -211,6 +236,42 @@ fn line_ends(points: &[TurbineMapPoint]) -> Option<LineEnds> {
 /// [`TurbineFitError`].
 pub fn fit_turbine(map: TurbineMap) -> Result<TurbineMap, TurbineFitError> {
     let fitted = TurbineFit::new(&map)?.table(&map);
+    Ok(TurbineMap { fitted: Some(fitted), ..map })
+}
+
+/// The map of the turbine at the points of a compressor test, without those that are unusable, with a fitted surface whose intervals contain the
+/// errors that all points share.
+///
+/// # Errors
+/// [`TurbineFitError`].
+pub fn identified_turbine_map(
+    machine: &str,
+    points: &[&TurbinePoint],
+) -> Result<TurbineMap, TurbineFitError> {
+    let mut used: Vec<&TurbinePoint> =
+        points.iter().copied().filter(|point| point.verdict != Verdict::Unusable).collect();
+    used.sort_by(|a, b| a.speed_parameter_rpm_sqrt_k.total_cmp(&b.speed_parameter_rpm_sqrt_k));
+    // Within a line, whose speeds vary by a per cent, points are in order of expansion.
+    let lines = used.chunk_by(|a, b| {
+        b.speed_parameter_rpm_sqrt_k <= TurbineMap::SAME_LINE_RATIO * a.speed_parameter_rpm_sqrt_k
+    });
+    let mut ordered: Vec<&TurbinePoint> = Vec::new();
+    for line in lines {
+        let mut line = line.to_vec();
+        line.sort_by(|a, b| a.expansion_ratio.total_cmp(&b.expansion_ratio));
+        ordered.extend(line);
+    }
+    let point = |point: &&TurbinePoint| TurbineMapPoint {
+        vane_position: point.vane_position,
+        speed_parameter_rpm_sqrt_k: point.speed_parameter_rpm_sqrt_k,
+        flow_parameter_kg_sqrt_k_s_kpa: point.flow_parameter_kg_sqrt_k_s_kpa,
+        expansion_ratio: point.expansion_ratio,
+        efficiency: point.efficiency,
+    };
+    let map =
+        TurbineMap { machine: machine.to_owned(), points: ordered.iter().map(point).collect(), fitted: None };
+    let common: Vec<&TurbineCommonErrors> = ordered.iter().map(|point| &point.common).collect();
+    let fitted = TurbineFit::with_common_errors(&map, &common)?.table(&map);
     Ok(TurbineMap { fitted: Some(fitted), ..map })
 }
 

@@ -1,5 +1,6 @@
 //! A quantity of a turbine map as a polynomial over vane position, speed and one coordinate of the expansion, by linear least squares.
 
+use mapper_core::half_width_95;
 use mapper_numerics::statistics::{SHARE_975, range, student_quantile};
 use nalgebra::{DMatrix, DVector};
 
@@ -14,11 +15,13 @@ pub(crate) type Place = [f64; 3];
 pub(crate) type Term = [i32; 3];
 
 /// A value to fit, and the line to which it belongs.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Observation {
     pub place: Place,
     pub value: f64,
     pub line: usize,
+    /// Changes of the value by one standard deviation of each error that all values share; the same places in all.
+    pub changes: Vec<f64>,
 }
 
 /// A fitted polynomial.
@@ -26,6 +29,8 @@ pub(crate) struct Observation {
 pub(crate) struct Surface {
     terms: Vec<Term>,
     coefficients: DVector<f64>,
+    /// Those of the change by each error that all values share.
+    common: Vec<DVector<f64>>,
     /// Inverse of the normal matrix.
     inverse: DMatrix<f64>,
     centre: Place,
@@ -68,6 +73,7 @@ impl Surface {
         let lines = 1 + observations.iter().map(|observation| observation.line).max()?;
         let mut surface = Surface {
             coefficients: DVector::zeros(terms.len()),
+            common: Vec::new(),
             inverse: DMatrix::zeros(terms.len(), terms.len()),
             terms,
             centre,
@@ -79,7 +85,7 @@ impl Surface {
         let mut squares = Vec::new();
         for line in inner_lines(observations, lines) {
             let (left_out, kept): (Vec<Observation>, Vec<Observation>) =
-                observations.iter().partition(|observation| observation.line == line);
+                observations.iter().cloned().partition(|observation| observation.line == line);
             // With few lines the rest cannot be fitted: single points are left out below instead.
             if surface.solve(&kept).is_some() {
                 squares.extend(left_out.iter().map(|o| (o.value - surface.value(o.place)).powi(2)));
@@ -122,6 +128,13 @@ impl Surface {
         let factor = normal.cholesky()?;
         self.inverse = factor.inverse();
         self.coefficients = factor.solve(&right);
+        let errors = observations.iter().map(|observation| observation.changes.len()).min().unwrap_or(0);
+        let change = |error: usize| {
+            let moved =
+                rows.iter().zip(observations).map(|(row, observation)| row * observation.changes[error]);
+            factor.solve(&moved.fold(DVector::zeros(self.terms.len()), |sum, row| sum + row))
+        };
+        self.common = (0..errors).map(change).collect();
         Some(())
     }
 
@@ -146,9 +159,11 @@ impl Surface {
         self.sigma * (1.0 + self.leverage(place)).sqrt()
     }
 
-    /// Half of the 95 % interval of a measured value at a place.
+    /// Half of the 95 % interval of a measured value at a place: by its scatter, and by the errors that all values share.
     pub fn half_width(&self, place: Place) -> f64 {
-        self.quantile * self.standard_error(place)
+        let row = self.row(place);
+        let common: f64 = self.common.iter().map(|coefficients| row.dot(coefficients).powi(2)).sum();
+        (self.quantile * self.standard_error(place)).hypot(half_width_95(common.sqrt()))
     }
 }
 

@@ -68,7 +68,13 @@ pub fn capacity_j_k(mass_kg: f64, tc_k: f64) -> f64 {
 /// Heat capacity of the turbine housing, J/K (Appendix A: 500-700 J/(kg K) over 300..800 K).
 #[inline]
 pub fn turbine_capacity_j_k(params: &Params, tt_k: f64) -> f64 {
-    params.turbine.housing_mass_kg * (500.0 + 200.0 * (tt_k - 300.0) / 500.0)
+    turbine_capacity_of_mass_j_k(params.turbine.housing_mass_kg, tt_k)
+}
+
+/// Heat capacity of a turbine housing of this mass, J/K.
+#[inline]
+pub fn turbine_capacity_of_mass_j_k(mass_kg: f64, tt_k: f64) -> f64 {
+    mass_kg * (500.0 + 200.0 * (tt_k - 300.0) / 500.0)
 }
 
 /// Housing temperatures at standstill.

@@ -2,6 +2,7 @@
 
 use crate::gas::air;
 use crate::gas::air::{Air, GAS_CONSTANT_J_KGK, HEAT_CAPACITY_RATIO as G, power};
+use crate::gas::mixture::Gas;
 use crate::laws::convection;
 use crate::machine::params::{BoundaryConditions, TurbineParams, rad_s_of_rpm};
 
@@ -98,6 +99,13 @@ impl TurbineInlet {
         }
     }
 
+    /// Efficiency by the parabola over the blade-speed ratio, with its peak at another one.
+    #[inline]
+    pub fn efficiency(params: &TurbineParams, blade_speed_ratio: f64, peak_blade_speed_ratio: f64) -> f64 {
+        let deviation = (blade_speed_ratio - peak_blade_speed_ratio) / peak_blade_speed_ratio;
+        (params.peak_efficiency * (1.0 - 0.8 * deviation * deviation)).max(0.05)
+    }
+
     /// The turbine with a housing at `tt_k` and a shaft at `shaft_speed_rad_s`.
     ///
     /// `T4 = T3' - eta_t T3' (1 - (P3/P4)^(-R/cp(T3)))`, `W_t = m_t cp(T3) (T3' - T4)`, efficiency a parabola over
@@ -114,8 +122,7 @@ impl TurbineInlet {
         let spouting_velocity_m_s =
             (2.0 * cp_prime * t3_prime_k * isentropic_drop_ratio(self.ln_expansion_ratio, exponent)).sqrt();
         let blade_speed_ratio = shaft_speed_rad_s * params.wheel_radius_m / spouting_velocity_m_s;
-        let deviation = (blade_speed_ratio - params.peak_blade_speed_ratio) / params.peak_blade_speed_ratio;
-        let efficiency = (params.peak_efficiency * (1.0 - 0.8 * deviation * deviation)).max(0.05);
+        let efficiency = Self::efficiency(params, blade_speed_ratio, params.peak_blade_speed_ratio);
         let drop_k = efficiency * t3_prime_k * self.isentropic_drop_ratio;
         TurbineState {
             t3_prime_k,
@@ -127,6 +134,24 @@ impl TurbineInlet {
             blade_speed_ratio,
         }
     }
+}
+
+/// Isentropic drop of the specific enthalpy from a total inlet state to the outlet pressure, J/kg: `h(T) - h(T_s)` with
+/// `s(T_s, p4) = s(T, p3)`. The denominator of a turbine's efficiency (SAE J1826).
+///
+/// ```
+/// use mapper_physics::{gas::mixture::Gas, laws::turbine::isentropic_drop_j_kg};
+/// // Air tables (Moran and Shapiro, table A-22): from 773.15 K to a third of the pressure 211.2 kJ/kg.
+/// assert!((isentropic_drop_j_kg(Gas::air(), 773.15, 3.0) / 211.2e3 - 1.0).abs() < 2e-3);
+/// ```
+pub fn isentropic_drop_j_kg(gas: Gas, inlet_k: f64, expansion_ratio: f64) -> f64 {
+    let gas = Air::new(gas, 0.0);
+    gas.enthalpy_rise_j_kg(gas.isentropic_k(inlet_k, expansion_ratio.recip()), inlet_k)
+}
+
+/// Blade speed at the wheel's inlet over the spouting velocity of that drop.
+pub fn blade_speed_ratio(wheel_radius_m: f64, shaft_speed_rad_s: f64, isentropic_drop_j_kg: f64) -> f64 {
+    shaft_speed_rad_s * wheel_radius_m / (2.0 * isentropic_drop_j_kg).sqrt()
 }
 
 /// `1 - ER^-kappa`, kappa = R/cp: the isentropic temperature drop over the inlet temperature.

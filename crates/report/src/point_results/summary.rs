@@ -7,11 +7,12 @@ use crate::point_results::points::{
     allowance_sentence, disagreement_text, points_by_line, shared_errors_text, verdict_sentence, wide_table,
 };
 use crate::test_report::zero_and_sensors::{SurgeReport, surge_section, zero_section};
+use crate::turbine::{summary_sentence, turbine_section};
 use mapper_core::{CompressorMap, IdentifiedPoint, ResultRemark, ThermalModel, Verdict};
 use mapper_identify::{DynamicEfficiency, ZeroOutcome};
 use mapper_maps::RepeatedJump;
 use mapper_observe::FusedChannel;
-use mapper_recording::score::{ScoreSummary, ScoredPoint, summarise};
+use mapper_recording::score::{ScoreSummary, ScoredPoint, ScoredTurbinePoint, summarise};
 
 /// What an identification found.
 #[derive(Clone, Copy)]
@@ -32,6 +33,8 @@ pub struct PointResults<'a> {
     pub sensors: &'a [FusedChannel],
     /// Result of the search for surge; `None` if there was none.
     pub surge: Option<&'a SurgeReport>,
+    /// The turbine at the points.
+    pub turbine: &'a [ScoredTurbinePoint],
     /// Further remarks: on the recording, the method and the map.
     pub remarks: &'a [ResultRemark],
 }
@@ -63,6 +66,7 @@ impl<'a> PointResults<'a> {
             "+/- covers the 95 % interval; -a/+b are the distances to its ends if they differ by more than a half. Common errors, repeats, sensors and zero: {more}, or the page of the run."
         ));
         document.text(allowance_sentence(self.identified()).unwrap_or_default());
+        document.text(summary_sentence(self.turbine).unwrap_or_default());
         document.append(self.conclusion());
         document
     }
@@ -83,6 +87,7 @@ impl<'a> PointResults<'a> {
         }
         document.text(shared_errors_text(self.identified(), display).unwrap_or_default());
         document.append(self.common_parts(display, truth));
+        document.section("Turbine", turbine_section(self.turbine, None));
         self.closing(&mut document, warnings);
         document.append(self.conclusion());
         document

@@ -16,10 +16,11 @@ use crate::test_report::conditions::{
 };
 use crate::test_report::key_figures::{PointsOrigin, assumed_sentence, key_figures};
 use crate::test_report::zero_and_sensors::zero_sentence;
+use crate::turbine::turbine_section;
 use mapper_campaign::Campaign;
 use mapper_core::{
     AvoidedCrossing, AvoidedTime, Channel, DeclaredUncertainty, Event, EventKind, Method, Plan, PointBudgets,
-    Recording, ReferenceState, StepKind, Verdict, step_number,
+    Recording, ReferenceState, StepKind, TurbineMap, Verdict, step_number,
 };
 use mapper_diagnose::gap::{Diagnosed, PointCorrection};
 use mapper_identify::{FittedReadings, ZeroOutcome};
@@ -69,6 +70,8 @@ pub struct RunReport<'a> {
     pub fitted: &'a [(usize, Vec<FittedReadings>)],
     /// The diagnosis of the gap to the nominal model, if there is one.
     pub gap: Option<&'a Diagnosed>,
+    /// The map of the turbine, if there is one.
+    pub turbine_map: Option<&'a TurbineMap>,
     /// Maps for comparison.
     pub others: &'a [OtherRun<'a>],
 }
@@ -218,6 +221,7 @@ impl RunReport<'_> {
         document.named_section("step", "Transient of a point", step);
         document.named_section("conditions", "Conditions and instruments", self.conditions(&display));
         document.named_section("points", "Points by speed line", self.points(&display));
+        document.named_section("turbine", "Turbine", turbine_section(self.results.turbine, self.turbine_map));
         let mut corrections = Document::default();
         corrections.table(correction_table(self.corrections));
         document.named_section("corrections", "Before and after the correction", corrections);

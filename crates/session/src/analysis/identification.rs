@@ -12,7 +12,7 @@ use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{
     Channel, CompressorMap, IdentifiedPoint, JsonMessages, Method, PointBudgets, Recording, ResultRemark,
-    StepMarker, StepOrigin, ThermalModel, join_recordings,
+    StepMarker, StepOrigin, ThermalModel, TurbineHousing, TurbineMap, TurbinePoint, join_recordings,
 };
 use mapper_diagnose::gap::PointCorrection;
 use mapper_identify::{
@@ -20,13 +20,14 @@ use mapper_identify::{
     NominalRig, PeriodicError, ZeroOutcome, ZeroSettings, blade_count, identify_recording, isothermal_zero,
     method_for, with_measured_humidity,
 };
-use mapper_maps::{AssembleError, RepeatedJump, assemble, repeated_jumps};
+use mapper_maps::{AssembleError, RepeatedJump, assemble, identified_turbine_map, repeated_jumps};
 use mapper_observe::FusedChannel;
 use mapper_observe::declared::CommonOffset;
 use mapper_observe::energy_balance::Gases;
 use mapper_physics::gas::air::Air;
 use mapper_recording::score::{
-    PendingTruths, ScoreSummary, ScoredPoint, Truth, score, score_marks, with_truths,
+    PendingTruths, ScoreSummary, ScoredPoint, ScoredTurbinePoint, Truth, score, score_marks, score_turbine,
+    with_truths,
 };
 use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
 use mapper_report::{Message, PointResults, SurgeReport};
@@ -52,6 +53,10 @@ pub struct Identified {
     pub config: IdentifyConfig,
     /// The points, with the truth if the recording contains it.
     pub points: Vec<ScoredPoint>,
+    /// The turbine at the points whose turbine side was measured, with the truth.
+    pub turbine: Vec<ScoredTurbinePoint>,
+    /// The heat balance of the turbine housing.
+    pub turbine_housing: Option<TurbineHousing>,
     /// Parameters common to all points (joint method).
     pub thermal: Option<ThermalModel>,
     /// Two-parameter results for the same steps (joint method).
@@ -102,6 +107,8 @@ impl Identified {
             "efficiency": self.config.air.efficiency,
             "gas": self.config.air.description(),
             "points": self.points,
+            "turbine": self.turbine,
+            "turbine_housing": self.turbine_housing,
             "thermal": self.thermal,
             "dynamic": self.dynamic,
             "faults": self.faults,
@@ -133,6 +140,7 @@ impl Identified {
             zero: &self.zero,
             sensors: &self.sensors,
             surge: self.surge.as_ref(),
+            turbine: &self.turbine,
             remarks,
         }
     }
@@ -168,6 +176,12 @@ impl Identified {
         let map = assemble(&points, machine, config.reference, config.method)?;
         let surge = self.surge.iter().flat_map(|found| found.marks.iter().map(|scored| scored.mark));
         Ok(CompressorMap { surge: surge.collect(), ..with_gas(map, config.air) })
+    }
+
+    /// The map of the turbine; `None` with too few points.
+    pub fn turbine_map(&self, machine: &str) -> Option<TurbineMap> {
+        let points: Vec<&TurbinePoint> = self.turbine.iter().map(|scored| &scored.point).collect();
+        identified_turbine_map(machine, &points).ok()
     }
 
     /// Jumps that were repeated.
@@ -287,13 +301,32 @@ impl Session<'_> {
             |source: &Source| source.may_have_truth.then(|| candidates.next()).flatten().unwrap_or_default();
         let truths: Vec<Truth> = sources.iter().map(truth).collect();
         let surge = collect_surge_marks(&sources, &truths, off, campaign, &config);
-        let points = scored(&sources, &truths, &recording, &origins, points);
+        let points = score_by_source(
+            &sources,
+            &truths,
+            (&recording, &origins),
+            points,
+            |point| &mut point.step,
+            score,
+            |scored| &mut scored.point.step,
+        );
+        let turbine = score_by_source(
+            &sources,
+            &truths,
+            (&recording, &origins),
+            identified.turbine,
+            |point| &mut point.step,
+            score_turbine,
+            |scored| &mut scored.point.step,
+        );
         let score = mapper_recording::score::summarise(&points);
         Ok(Identified {
             recording,
             origins,
             config,
             points,
+            turbine,
+            turbine_housing: identified.turbine_housing,
             thermal: identified.thermal,
             dynamic: identified.dynamic,
             faults: identified.faults,
@@ -372,34 +405,42 @@ fn may_have_truth(recorded: &Recorded) -> bool {
     recorded.read.format.is_some()
 }
 
-/// The points with their truth, each from its own recording.
-fn scored(
+/// Points with their truth, each from its own recording, in which steps have other numbers than in all together.
+fn score_by_source<P: Clone, S>(
     sources: &[Source],
     truths: &[Truth],
-    recording: &Recording,
-    origins: &[StepOrigin],
-    points: Vec<IdentifiedPoint>,
-) -> Vec<ScoredPoint> {
+    (recording, origins): (&Recording, &[StepOrigin]),
+    points: Vec<P>,
+    step_of: impl Fn(&mut P) -> &mut usize,
+    score: impl Fn(&Truth, &[StepMarker], Vec<P>) -> Vec<S>,
+    step_of_scored: impl Fn(&mut S) -> &mut usize,
+) -> Vec<S> {
     let origin_of = |index: usize| {
         let position = recording.steps.iter().position(|step| step.index == index)?;
         origins.get(position)
     };
-    let mut scored: Vec<(usize, ScoredPoint)> = Vec::new();
+    let mut all: Vec<(usize, S)> = Vec::new();
     for (number, (source, truth)) in sources.iter().zip(truths).enumerate() {
-        let theirs = points.iter().enumerate().filter_map(|(place, point)| {
-            let origin = origin_of(point.step).filter(|origin| origin.recording == number)?;
-            Some((place, point.step, IdentifiedPoint { step: origin.step, ..point.clone() }))
-        });
-        let (places, alone): (Vec<(usize, usize)>, Vec<IdentifiedPoint>) =
-            theirs.map(|(place, step, point)| ((place, step), point)).unzip();
-        let alone = score(truth, &source.steps, alone);
-        scored.extend(places.into_iter().zip(alone).map(|((place, step), mut point)| {
-            point.point.step = step;
+        let (mut places, mut alone) = (Vec::new(), Vec::new());
+        for (place, point) in points.iter().enumerate() {
+            let mut point = point.clone();
+            let step = step_of(&mut point);
+            let together = *step;
+            let Some(origin) = origin_of(together).filter(|origin| origin.recording == number) else {
+                continue;
+            };
+            *step = origin.step;
+            places.push((place, together));
+            alone.push(point);
+        }
+        let scored = score(truth, &source.steps, alone);
+        all.extend(places.into_iter().zip(scored).map(|((place, together), mut point)| {
+            *step_of_scored(&mut point) = together;
             (place, point)
         }));
     }
-    scored.sort_by_key(|(place, _)| *place);
-    scored.into_iter().map(|(_, point)| point).collect()
+    all.sort_by_key(|(place, _)| *place);
+    all.into_iter().map(|(_, point)| point).collect()
 }
 
 /// The marks of all approaches with their truth; `None` if there was no surge search.

@@ -4,7 +4,7 @@
 use crate::analysis::identification::Identified;
 use crate::recording::files::{Existing, json_text, program_and_commit, write_files, write_new};
 use crate::recording::recording_file::{Recorded, merge_parts};
-use crate::recording::run_directory;
+use crate::recording::run_directory::{self, TURBINE_MAP};
 use crate::{Gap, Registry, Session, SessionError};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
@@ -15,10 +15,11 @@ use mapper_core::{
     ThermalModel, with_sentences,
 };
 use mapper_maps::{MapFit, MapFitOptions, RepeatedJump};
+use mapper_recording::score::ScoredTurbinePoint;
 use mapper_recording::{ChannelMap, ReadOptions, ReadWarning, read_recording};
 use mapper_report::{
-    Display, OtherRun, PointResults, PointsOrigin, ReportSource, RunReport, ThermalExport, TurbinePoint,
-    budget_csv, error_figure, heat_transfer_figure, instant, turbine_points, turbine_text,
+    Display, OtherRun, PointResults, PointsOrigin, ReportSource, RunReport, ThermalExport, budget_csv,
+    error_figure, heat_transfer_figure, instant, turbine_figure,
 };
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -248,7 +249,11 @@ impl Session<'_> {
         let repeats = identified.repeats();
         let (map, program) = (map.as_ref(), program_and_commit(self.registry.commit));
         let results = identified.shown(map, &repeats, &remarks);
-        let report = run_report(&origin, &identified, results, &program);
+        let turbine_map = identified.turbine_map(&origin.machine);
+        let report = RunReport {
+            turbine_map: turbine_map.as_ref(),
+            ..run_report(&origin, &identified, results, &program)
+        };
         Ok(RunReport { others: &others, gap: gap.map(|gap| &gap.diagnosed), ..report }.page()?)
     }
 
@@ -270,6 +275,19 @@ impl Session<'_> {
             }
             None => BTreeMap::new(),
         };
+        let turbine_map = identified.turbine_map(&origin.machine);
+        if let Some(turbine) = &turbine_map {
+            for name in origin.formats() {
+                let format = self.registry.written_format(&name)?;
+                // A format without turbine maps has that of the compressor alone.
+                let Ok(bytes) = format.write_turbine(turbine) else { continue };
+                files.write(&format!("{TURBINE_MAP}.{}", format.extension), &bytes);
+            }
+        }
+        if !identified.turbine.is_empty() {
+            let figure = turbine_figure(&origin.machine, &identified.turbine, turbine_map.as_ref());
+            files.write(&format!("{TURBINE_MAP}.svg"), figure.to_svg().as_bytes());
+        }
         let points_file = match self.registry.sentences {
             Some(sentences) => with_sentences(sentences, || identified.points_json()),
             None => identified.points_json(),
@@ -282,7 +300,11 @@ impl Session<'_> {
         let (repeats, program) = (identified.repeats(), program_and_commit(self.registry.commit));
         let has_picture = map.contains_key("svg");
         let results = identified.shown(compressor_map.as_ref(), &repeats, &remarks);
-        let shown = RunReport { has_picture, ..run_report(origin, &identified, results, &program) };
+        let shown = RunReport {
+            has_picture,
+            turbine_map: turbine_map.as_ref(),
+            ..run_report(origin, &identified, results, &program)
+        };
         let report = files.write(run_directory::REPORT, shown.markdown().as_bytes());
         let page = files.write(run_directory::PAGE, shown.page()?.as_bytes());
         identified.remarks = remarks;
@@ -360,6 +382,7 @@ fn run_report<'a>(
         has_picture: false,
         fitted: &identified.fitted,
         gap: None,
+        turbine_map: None,
         others: &[],
     }
 }
@@ -440,7 +463,7 @@ pub struct RigFiles {
     /// The files.
     pub files: Vec<PathBuf>,
     /// The turbine at each point.
-    pub turbine: Vec<TurbinePoint>,
+    pub turbine: Vec<ScoredTurbinePoint>,
     /// Parameters common to all points (joint method).
     pub thermal: Option<ThermalModel>,
 }
@@ -461,24 +484,28 @@ impl Session<'_> {
         let identified = self.identify(recorded, map, None)?;
         let points: Vec<IdentifiedPoint> = identified.points_alone().cloned().collect();
         let (machine, params) = (&campaign.machine.name, &campaign.machine.params);
-        let thermal = ThermalExport { machine, params, found: identified.thermal.as_ref() };
-        let gases = identified.gases();
-        let turbine = turbine_points(&identified.recording, &points, &gases);
+        let thermal = ThermalExport {
+            machine,
+            params,
+            found: identified.thermal.as_ref(),
+            turbine_housing: identified.turbine_housing.as_ref(),
+        };
         let law = identified.thermal.as_ref().and_then(|found| found.convection.as_ref()?.exponent.value);
         let heat = heat_transfer_figure(machine, &points, law.unwrap_or(params.compressor.nusselt_exponent));
         let mut contents: Vec<(&str, Vec<u8>)> = vec![
             ("thermal_model.json", thermal.json()?),
-            ("turbine.txt", turbine_text(machine, &gases, &turbine).into_bytes()),
-            ("turbine.json", json_text(&turbine)?.into_bytes()),
             ("heat_transfer.svg", heat.to_svg().into_bytes()),
             ("heat_transfer.png", png(&heat)?),
         ];
+        if let Some(turbine) = identified.turbine_map(machine) {
+            contents.push(("turbine.txt", self.registry.written_format("sae")?.write_turbine(&turbine)?));
+        }
         if let Some(figure) = error_figure(machine, &identified.points) {
             contents.push(("error.svg", figure.to_svg().into_bytes()));
             contents.push(("error.png", png(&figure)?));
         }
         let files = write_files(out, &contents, Existing::Kept)?;
-        Ok(RigFiles { files, turbine, thermal: identified.thermal })
+        Ok(RigFiles { files, turbine: identified.turbine, thermal: identified.thermal })
     }
 }
 

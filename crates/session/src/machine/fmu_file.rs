@@ -1,11 +1,12 @@
 //! A machine as an FMU file, with its binary if a C compiler is there.
 
 use crate::errors::FmuExportError;
+use crate::machine::identified_machine::{with_identified, with_identified_turbine};
 use crate::recording::files::{Existing, read_at_most, write_file, write_new};
 use crate::recording::recording_file::Recorded;
 use crate::{Session, SessionError};
 use mapper_campaign::Campaign;
-use mapper_core::ThermalModel;
+use mapper_core::TurbinePoint;
 use mapper_fmu::{FmuFile, FmuMachine, FmuMap, archive, files, table_of_fit};
 use mapper_maps::{MapFitOptions, fit_map};
 use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
@@ -93,49 +94,30 @@ impl Session<'_> {
         } else {
             "as declared"
         };
+        let compressor =
+            thermal.map_or(campaign.machine.params, |found| with_identified(&campaign.machine.params, found));
+        let points: Vec<&TurbinePoint> = identified.turbine.iter().map(|scored| &scored.point).collect();
+        let whole = with_identified_turbine(&compressor, &points, identified.turbine_housing.as_ref());
+        let turbine = match whole {
+            Some(_) => {
+                "turbine and its housing as identified, bearing loss in its efficiency; mass of the compressor as declared"
+            }
+            None => "turbine, bearing and masses as declared",
+        };
         let export = FmuExport {
             name: campaign.machine.name.clone(),
             origin: format!(
                 "identified by the {} method: fitted map of {} points on {} speed lines, compressor's heat transfer {law}; \
-                 turbine, bearing and masses as declared",
+                 {turbine}",
                 identified.config.method,
                 map.lines.iter().map(|line| line.points.len()).sum::<usize>(),
                 map.lines.len()
             ),
-            params: thermal
-                .map_or(campaign.machine.params, |found| with_identified(&campaign.machine.params, found)),
+            params: whole.unwrap_or(compressor),
             map: FmuMap::Table(table),
         };
         write(export, &campaign, compile, out, existing)
     }
-}
-
-/// Declared parameters, replaced by the identified values if they exist.
-pub(crate) fn with_identified(declared: &Params, found: &ThermalModel) -> Params {
-    let mut params = *declared;
-    let compressor = &mut params.compressor;
-    compressor.internal_area_m2 = found.internal_area_m2;
-    if let Some(law) = &found.convection
-        && let Some((a, b)) = law.coefficient.value.zip(law.exponent.value)
-    {
-        compressor.nusselt_coefficient = a;
-        compressor.nusselt_exponent = b;
-        compressor.outlet_diameter_m = law.diameter_m;
-    }
-    if let Some(alpha) = found.alpha_area_ratio.value {
-        compressor.alpha_area_ratio = alpha;
-    }
-    if let Some(factor) = found.heating_cooling_ratio.value {
-        compressor.hot_metal_h_ratio = factor;
-    }
-    if let Some(inlet) = &found.inlet {
-        compressor.inlet_convection = inlet.convection;
-        compressor.inlet_diameter_m = inlet.diameter_m;
-    }
-    if let Some(diameter_m) = found.probe_diameter_m.value {
-        params.t2_probe_diameter_m = diameter_m;
-    }
-    params
 }
 
 fn write(

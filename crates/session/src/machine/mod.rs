@@ -2,6 +2,7 @@
 
 pub(crate) mod first_campaign;
 pub(crate) mod fmu_file;
+pub(crate) mod identified_machine;
 pub(crate) mod map_file;
 pub(crate) mod map_work;
 pub(crate) mod reduce;

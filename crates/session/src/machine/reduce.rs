@@ -2,7 +2,7 @@
 //! was measured, or T3 for its heat balance. Tables of turbine points (N, flow, P3, T3, P4, T4) become a turbine map.
 
 use crate::analysis::identification::with_gas;
-use crate::machine::fmu_file::with_identified;
+use crate::machine::identified_machine::with_identified;
 use crate::machine::map_work::{MapOut, MapWork, warnings, write_turbine_fitted_if_needed};
 use crate::recording::files::{Existing, read_at_most};
 use crate::recording::identification_config::{assumed_sensors, identification};

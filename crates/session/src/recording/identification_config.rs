@@ -48,6 +48,8 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         internal_area_sigma_ratio: internal_area_sigma_ratio(&campaign.machine.assumed),
         air: campaign.machine.params.compressor.air(),
         turbine_gas: campaign.machine.params.turbine.gas,
+        turbine: campaign.machine.params.turbine,
+        shaft_inertia_kgm2: campaign.machine.params.shaft_inertia_kgm2,
         humidity_sigma_kg_kg: campaign.report.humidity_sigma_kg_kg(&campaign.boundary),
         reference: campaign.reference,
         valve_play_ratio: campaign.rig_actuators().valve_play_ratio,
@@ -59,6 +61,7 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
             .unwrap_or_else(default_contact_sigma_ratio),
         inlet_tap: tap(Channel::P1),
         outlet_tap: tap(Channel::P2),
+        turbine_inlet_tap: tap(Channel::P3),
         declared: declared(campaign, &ChannelMap::native()),
         allowance: Allowance::from(&campaign.tolerances),
         ..IdentifyConfig::default()

@@ -17,6 +17,8 @@ pub const CAMPAIGN: &str = "campaign.yaml";
 pub const SEQUENCE: &str = "sequence.rhai";
 /// Identified points.
 pub const POINTS: &str = "points.json";
+/// The map of the turbine, without its extension.
+pub const TURBINE_MAP: &str = "turbine_map";
 /// Uncertainty budgets of the points.
 pub const BUDGET: &str = "budget.csv";
 /// The journal of safely recorded steps.
@@ -41,7 +43,9 @@ pub(crate) fn is_recording(path: &Path) -> bool {
 
 /// Whether a file of this name is a result: points, map, report, page, or executed steps of a script.
 pub(crate) fn is_result(name: &str) -> bool {
-    [POINTS, BUDGET, REPORT, PAGE, EXECUTED].contains(&name) || name.starts_with("map.")
+    [POINTS, BUDGET, REPORT, PAGE, EXECUTED].contains(&name)
+        || name.starts_with("map.")
+        || name.starts_with("turbine_map.")
 }
 
 /// Creates `<parent>/<campaign>-<time>`, with suffix `-2`, `-3`, ... if it already exists.

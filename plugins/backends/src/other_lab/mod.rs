@@ -6,8 +6,8 @@ mod machine;
 mod motion;
 mod settings_file;
 
-pub use motion::apply_structure;
 pub use machine::{NAME, OtherStructure};
+pub use motion::apply_structure;
 
 use crate::virtual_lab::VirtualLab;
 use mapper_core::{Backend, BackendError};

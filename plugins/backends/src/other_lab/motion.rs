@@ -3,11 +3,13 @@
 use crate::other_lab::machine::{NAME, OtherStructure, SIZES, STATES, evaluate, lumped_state, start};
 use crate::virtual_lab::{LabInputs, LabSettings, RunningMachine, SecondOrder, Structure, StructureError};
 use mapper_physics::machine::params::{BoundaryConditions, Params};
-use mapper_physics::simulation::steady::Inputs;
 use mapper_physics::simulation::model::{Model, Outputs, State};
 use mapper_physics::simulation::rosenbrock::{Integrator, OdeSystem, Tolerances};
-use mapper_physics::simulation::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch};
+use mapper_physics::simulation::simulate::{
+    Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch,
+};
 use mapper_physics::simulation::steady;
+use mapper_physics::simulation::steady::Inputs;
 use std::sync::Arc;
 
 /// Simulated time to a steady state, s: many time constants of the turbine housing.

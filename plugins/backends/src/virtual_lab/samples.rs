@@ -9,7 +9,9 @@ use mapper_core::{
     CHANNELS, Channel, ChannelColumn, ElementColumn, Event, MODELLED_CHANNELS, SampleBatch, Setpoints,
     TruthColumn,
 };
+use mapper_physics::gas::mixture::Gas;
 use mapper_physics::gas::pressure_tap;
+use mapper_physics::laws::turbine::isentropic_drop_j_kg;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::{ChannelFollower, Instruments};
 use mapper_physics::simulation::model::{Outputs, PreparedModel, State};
@@ -30,6 +32,15 @@ pub(crate) struct Instant<'a> {
 impl Instant<'_> {
     fn outputs(&self) -> Option<&Outputs> {
         self.running.map(|(_, outputs)| outputs)
+    }
+
+    /// Power of the turbine less what bearings and hooks take over the isentropic power from the gas behind the housing; NaN at standstill.
+    fn turbine_efficiency(&self, gas: Gas) -> f64 {
+        let Some(outputs) = self.outputs() else { return f64::NAN };
+        let expansion_ratio = self.boundary.p3_pa / self.boundary.p4_pa;
+        let drop_j_kg = isentropic_drop_j_kg(gas, outputs.turbine.t3_prime_k, expansion_ratio);
+        let power_w = outputs.turbine.power_w - outputs.friction_power_w + outputs.added.shaft_power_w;
+        power_w / (outputs.turbine_flow_kg_s * drop_j_kg)
     }
 
     /// Flow at which the current machine would surge at this speed, kg/s; NaN at standstill.
@@ -120,7 +131,9 @@ impl SampleCollector {
             let sensor = sensors.iter_mut().find(|(channel, _)| *channel == row.channel);
             column.push(drifted(sensor.map_or(truth, |(_, sensor)| sensor.read(truth))));
         }
-        self.truth.push([instant.speed_rpm, instant.tc_k, instant.tt_k, surge_flow_kg_s], instant.outputs());
+        let states = [instant.speed_rpm, instant.tc_k, instant.tt_k, surge_flow_kg_s];
+        let turbine_efficiency = instant.turbine_efficiency(settings.model.params.turbine.gas);
+        self.truth.push(states, turbine_efficiency, instant.outputs());
     }
 
     pub(crate) fn finish(self, events: Vec<Event>) -> SampleBatch {
@@ -214,7 +227,7 @@ fn true_value(
 type Reader = fn(&Outputs) -> f64;
 
 /// Columns from the model's outputs: name, unit, value. Undefined (NaN) at standstill.
-const FROM_OUTPUTS: [(&str, &str, Reader); 9] = [
+const FROM_OUTPUTS: [(&str, &str, Reader); 11] = [
     ("eta", "1", |outputs| outputs.efficiency),
     ("h_w_m2k", "W/(m2 K)", |outputs| outputs.h_w_m2k),
     ("flow_kg_s", "kg/s", |outputs| outputs.flow_kg_s),
@@ -224,6 +237,8 @@ const FROM_OUTPUTS: [(&str, &str, Reader); 9] = [
     ("t2_prime_k", "K", |outputs| outputs.t2_prime_k),
     ("t2_gas_k", "K", |outputs| outputs.t2_k),
     ("compressor_power_w", "W", |outputs| outputs.compressor_power_w),
+    ("t3_prime_k", "K", |outputs| outputs.turbine.t3_prime_k),
+    ("turbine_heat_w", "W", |outputs| outputs.turbine.heat_w),
 ];
 
 /// Collects truth into columns.
@@ -234,11 +249,18 @@ pub struct TruthRecorder {
     tc_k: Vec<f64>,
     tt_k: Vec<f64>,
     surge_flow_kg_s: Vec<f64>,
+    turbine_efficiency: Vec<f64>,
 }
 
 impl TruthRecorder {
-    /// Adds one sample: shaft speed, temperatures of both housings, surge flow at this speed; `outputs` is `None` at standstill.
-    pub fn push(&mut self, [speed_rpm, tc_k, tt_k, surge_flow_kg_s]: [f64; 4], outputs: Option<&Outputs>) {
+    /// Adds one sample: shaft speed, temperatures of both housings, surge flow at this speed; efficiency of turbine and bearings; `outputs` is
+    /// `None` at standstill.
+    pub fn push(
+        &mut self,
+        [speed_rpm, tc_k, tt_k, surge_flow_kg_s]: [f64; 4],
+        turbine_efficiency: f64,
+        outputs: Option<&Outputs>,
+    ) {
         for (column, (_, _, read)) in self.from_outputs.iter_mut().zip(FROM_OUTPUTS) {
             column.push(outputs.map_or(f64::NAN, read));
         }
@@ -246,6 +268,7 @@ impl TruthRecorder {
         self.tc_k.push(tc_k);
         self.tt_k.push(tt_k);
         self.surge_flow_kg_s.push(surge_flow_kg_s);
+        self.turbine_efficiency.push(turbine_efficiency);
     }
 
     /// The columns.
@@ -264,6 +287,7 @@ impl TruthRecorder {
         columns.push(column("tc_k", "K", self.tc_k));
         columns.push(column("tt_k", "K", self.tt_k));
         columns.push(column("surge_flow_kg_s", "kg/s", self.surge_flow_kg_s));
+        columns.push(column("turbine_efficiency", "1", self.turbine_efficiency));
         columns
     }
 }

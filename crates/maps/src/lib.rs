@@ -20,4 +20,5 @@ pub use map_fit::{MapFit, MapFitError, MapFitOptions, NearestPlace, fit_map, lea
 pub use turbine::turbine_compare::{TurbineComparison, TurbinePointComparison, compare_turbines};
 pub use turbine::turbine_fit::{
     ReducedTurbinePoint, TurbineFit, TurbineFitError, fit_turbine, identified_turbine_map, reduce_turbine,
+    turbine_points_by_line,
 };

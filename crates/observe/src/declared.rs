@@ -136,6 +136,23 @@ pub fn usual_offset_sigma(channel: Channel) -> f64 {
     if channel.info().dimension == Dimension::Pressure { USUAL_OFFSET_PA } else { USUAL_OFFSET_K }
 }
 
+/// Errors of a usual sensor of a gas stand, of which nothing is declared.
+pub fn usual_sensor(channel: Channel) -> DeclaredUncertainty {
+    let noise_sigma = usual_noise_sigma(channel);
+    match channel.info().dimension {
+        Dimension::MassFlow => DeclaredUncertainty {
+            noise_sigma,
+            gain_sigma_ratio: ModelTolerances::default().flow_meter_gain_ratio,
+            ..DeclaredUncertainty::default()
+        },
+        _ => DeclaredUncertainty {
+            noise_sigma,
+            offset_sigma: usual_offset_sigma(channel),
+            ..DeclaredUncertainty::default()
+        },
+    }
+}
+
 /// A static tap: the pressure's channel, and the inner diameter of the pipe, m, > 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StaticTap {

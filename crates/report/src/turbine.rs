@@ -1,4 +1,4 @@
-//! The turbine of a compressor test: table, picture, map as text.
+//! The turbine of a compressor test: sentence, table and picture.
 
 use crate::document::{Cell, Document, Table};
 use crate::formatting::{Message, number, percent};
@@ -8,6 +8,7 @@ use mapper_core::{
     FittedTurbine, FittedTurbineLine, Margins, TurbineDoubt, TurbineMap, TurbinePoint, Verdict,
     half_width_95, one_line, step_number,
 };
+use mapper_maps::turbine_points_by_line;
 use mapper_numerics::statistics::{median, range};
 use mapper_recording::score::ScoredTurbinePoint;
 
@@ -43,35 +44,28 @@ pub(crate) fn turbine_section(points: &[ScoredTurbinePoint], map: Option<&Turbin
         "verdict",
     ];
     let mut table = Table::new(heads).caption("rpm/K^0.5, flow in kg K^0.5/(s kPa)");
-    let mut sorted: Vec<&TurbinePoint> = points.iter().map(|scored| &scored.point).collect();
-    sorted.sort_by(|a, b| {
-        let line = |point: &TurbinePoint| (point.speed_parameter_rpm_sqrt_k / LINE_RPM_SQRT_K).round();
-        line(a).total_cmp(&line(b)).then(a.expansion_ratio.total_cmp(&b.expansion_ratio))
-    });
-    for point in sorted {
+    let unordered: Vec<&TurbinePoint> = points.iter().map(|scored| &scored.point).collect();
+    let rounded =
+        |value: f64, decimals: usize| Cell::optional(Some(value), |value| number(Some(value), decimals));
+    for point in turbine_points_by_line(&unordered) {
         let flow = point.flow_parameter_kg_sqrt_k_s_kpa;
-        let half = |error: f64| half_width_95(error);
         let margins = point.efficiency.zip(point.efficiency_low.zip(point.efficiency_high));
         let margins = margins.map(|(value, (low, high))| Margins::new(value, low, high).scaled(100.0));
         table.row_of_step(
             Some(point.step),
             vec![
                 Cell::number(step_number(point.step).to_string(), point.step as f64),
-                Cell::optional(Some(point.speed_parameter_rpm_sqrt_k), |value| number(Some(value), 0)),
-                Cell::optional(Some(point.expansion_ratio), |value| number(Some(value), 4)),
-                Cell::optional(Some(half(point.expansion_ratio_standard_error)), |value| {
-                    number(Some(value), 4)
-                }),
-                Cell::optional(Some(flow), |value| number(Some(value), 5)),
-                Cell::optional(Some(50.0 * (point.flow_high - point.flow_low) / flow), |value| {
-                    number(Some(value), 2)
-                }),
-                Cell::optional(Some(point.blade_speed_ratio), |value| number(Some(value), 3)),
+                rounded(point.speed_parameter_rpm_sqrt_k, 0),
+                rounded(point.expansion_ratio, 4),
+                rounded(half_width_95(point.expansion_ratio_standard_error), 4),
+                rounded(flow, 5),
+                rounded(50.0 * (point.flow_high - point.flow_low) / flow, 2),
+                rounded(point.blade_speed_ratio, 3),
                 Cell::optional(point.efficiency, |value| percent(Some(value), 2)),
                 Cell::margins(margins, 2),
-                Cell::optional(Some(point.heat_w), |value| number(Some(value), 0)),
-                Cell::optional(Some(half(point.heat_standard_error_w)), |value| number(Some(value), 0)),
-                Cell::optional(Some(point.t3_prime_k), |value| number(Some(value), 1)),
+                rounded(point.heat_w, 0),
+                rounded(half_width_95(point.heat_standard_error_w), 0),
+                rounded(point.t3_prime_k, 1),
                 Cell::verdict(point.verdict),
             ],
         );
@@ -86,9 +80,6 @@ pub(crate) fn turbine_section(points: &[ScoredTurbinePoint], map: Option<&Turbin
     document
 }
 
-/// Distance of speed parameters that are sorted as one line, rpm/K^0.5. Bound: below that of speed lines, above the scatter of a held speed.
-const LINE_RPM_SQRT_K: f64 = 60.0;
-
 /// Range and accuracy of the points in one sentence; `None` without an efficiency.
 pub(crate) fn summary_sentence(points: &[ScoredTurbinePoint]) -> Option<String> {
     let known = || points.iter().filter(|scored| scored.point.verdict != Verdict::Unusable);
@@ -100,7 +91,7 @@ pub(crate) fn summary_sentence(points: &[ScoredTurbinePoint]) -> Option<String> 
     let (low, high) = range(etas.iter().copied());
     let good = points.iter().filter(|scored| scored.point.verdict == Verdict::Good).count();
     Some(format!(
-        "Turbine: {good} of {} points are good; turbine times mechanical efficiency {} to {} %, in the middle known to +/- {} points.",
+        "Turbine: {good} of {} points are good; turbine times mechanical efficiency {} to {} %, median 95 % interval +/- {} points.",
         points.len(),
         percent(Some(low), 1),
         percent(Some(high), 1),
@@ -170,6 +161,9 @@ impl Message for TurbineDoubt {
         match self {
             TurbineDoubt::CompressorPoint => {
                 "the compressor's point is not good, and its power is the turbine's".to_owned()
+            }
+            TurbineDoubt::ApparentEfficiency => {
+                "the compressor's efficiency is apparent: heat to its housing counts as power, and no interval contains it".to_owned()
             }
             TurbineDoubt::Impossible => {
                 "the efficiency is not between 0 and 100 %; check flow and pressures of the turbine".to_owned()

@@ -9,6 +9,8 @@ named_enum! {
     pub enum TurbineDoubt {
         /// The compressor's point is doubtful or unusable, and so is the power that it takes from the shaft.
         CompressorPoint = "compressor_point",
+        /// The compressor's efficiency is apparent, so that heat to its housing counts as power.
+        ApparentEfficiency = "apparent_efficiency",
         /// The efficiency is not between 0 and 1.
         Impossible = "impossible",
         /// The interval is too wide.

@@ -11,14 +11,15 @@ mod housing;
 
 use crate::single_step::budgets;
 use crate::single_step::dynamic::ReadingError;
-use crate::turbine::housing::{HousingBalance, HousingState, Line, housing_state};
+use crate::turbine::housing::{HousingBalance, Line, housing_state};
 use crate::{IdentifyConfig, PressureTap};
 use mapper_core::{
-    Channel, IdentifiedPoint, Recording, StepMarker, TurbineCommonErrors, TurbineDoubt, TurbineHousing,
-    TurbinePoint, UncertaintyBudget, Verdict, confidence_interval_95, half_width_95, is_reading,
-    standard_error_of,
+    Channel, DeclaredUncertainty, IdentifiedPoint, Recording, StepMarker, TurbineCommonErrors, TurbineDoubt,
+    TurbineHousing, TurbinePoint, UncertaintyBudget, Verdict, Warning, confidence_interval_95, half_width_95,
+    is_reading, standard_error_of,
 };
 use mapper_numerics::statistics::mean;
+use mapper_observe::declared::usual_sensor;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::{compressed_k, isentropic_rise_ratio};
 use mapper_physics::laws::turbine::{blade_speed_ratio, isentropic_drop_j_kg};
@@ -31,7 +32,7 @@ const STEP_SIGMAS: f64 = 0.1;
 /// Pascals in a kilopascal. Source: definition.
 const PA_PER_KPA: f64 = 1e3;
 
-/// Channels whose readings give a turbine point, in the order of [`Readings`].
+/// Channels whose readings give a turbine point, in the order of [`Inputs::readings`].
 const READINGS: [Channel; 8] = [
     Channel::CompressorFlow,
     Channel::T1,
@@ -124,8 +125,8 @@ fn turbine_point(
 ) -> Option<TurbinePoint> {
     let span_s = ((step.end_s - AVERAGE_S).max(step.start_s), step.end_s);
     let state = housing_state(recording, span_s)?;
-    let (inputs, samples) = inputs(recording, span_s, point, &state, balance, config)?;
     let (heat_w, heat_sigma_w) = balance.heat_w(&state);
+    let (inputs, samples) = inputs(recording, span_s, point, heat_w, config)?;
     let numbers = inputs.numbers(config);
     let ratio = numbers.expansion_ratio;
     if !(ratio > 1.0 && ratio.is_finite() && inputs.speed_rad_s > 0.0) {
@@ -143,7 +144,7 @@ fn turbine_point(
     let mut eta_left =
         point.eta_low.zip(point.eta_high).map_or(0.0, |(low, high)| standard_error_of(low, high).powi(2));
     let mut rows = Vec::new();
-    let (mut common, mut own) = (TurbineCommonErrors::default(), Change::default());
+    let mut common = TurbineCommonErrors::default();
     let mut variances = Change::default();
     let mut push = |source: String, sigma: f64, unit: &str, change: Change, is_common: bool| {
         variances.ln_flow += change.ln_flow.powi(2);
@@ -153,8 +154,6 @@ fn turbine_point(
             common.ln_flow_changes.push(change.ln_flow);
             common.ln_expansion_ratio_changes.push(change.ln_ratio);
             common.efficiency_changes.push(change.efficiency);
-        } else {
-            own.efficiency = own.efficiency.hypot(change.efficiency);
         }
         if sigma > 0.0 && change.efficiency.is_finite() && change.efficiency != 0.0 {
             rows.push(budgets::row(source, sigma, unit, change.efficiency / sigma, change.efficiency));
@@ -172,7 +171,7 @@ fn turbine_point(
         push(source, sigma, unit, change(moved, STEP_SIGMAS), true);
     };
     for (place, channel) in READINGS.into_iter().enumerate() {
-        let declared = config.sensor(channel);
+        let declared = sensor(channel, config);
         let alone = |by: f64| std::array::from_fn(|i| if i == place { by } else { 0.0 });
         let unit = channel.unit();
         let offset = declared.offset_sigma;
@@ -193,7 +192,7 @@ fn turbine_point(
     let heated = Inputs { heat_w: heat_w + STEP_SIGMAS * heat_sigma_w, ..inputs };
     push("heat before the wheel".to_owned(), heat_sigma_w, "W", change(heated, STEP_SIGMAS), true);
     for (place, channel) in READINGS.into_iter().enumerate() {
-        let declared = config.sensor(channel);
+        let declared = sensor(channel, config);
         let share = config.noise().variance_of_mean(samples[place], span_s.1 - span_s.0).sqrt();
         let sigma = declared.noise_sigma * share;
         let mut moved = inputs;
@@ -239,6 +238,11 @@ fn turbine_point(
     })
 }
 
+/// The errors of a sensor: as declared, otherwise those of a usual one.
+fn sensor(channel: Channel, config: &IdentifyConfig) -> DeclaredUncertainty {
+    config.declared.get(&channel).copied().unwrap_or_else(|| usual_sensor(channel))
+}
+
 fn is_pressure(channel: Channel) -> bool {
     matches!(channel, Channel::P1 | Channel::P2 | Channel::P3 | Channel::P4)
 }
@@ -253,6 +257,10 @@ fn judged(
     let mut verdict = point.verdict;
     if point.verdict != Verdict::Good {
         doubts.push(TurbineDoubt::CompressorPoint);
+    }
+    if point.warnings.contains(&Warning::Apparent) {
+        doubts.push(TurbineDoubt::ApparentEfficiency);
+        verdict = verdict.doubted();
     }
     if efficiency.is_some_and(|efficiency| !(efficiency > 0.0 && efficiency < 1.0)) {
         doubts.push(TurbineDoubt::Impossible);
@@ -271,8 +279,7 @@ fn inputs(
     recording: &Recording,
     span_s: (f64, f64),
     point: &IdentifiedPoint,
-    state: &HousingState,
-    balance: &HousingBalance<'_>,
+    heat_w: f64,
     config: &IdentifyConfig,
 ) -> Option<(Inputs, [usize; READINGS.len()])> {
     let mut readings = [f64::NAN; READINGS.len()];
@@ -296,7 +303,6 @@ fn inputs(
     let speed_rad_s = rad_s_of_rpm(mean(speeds_rpm.iter().filter(|value| is_usable(**value)))?);
     let slope_rpm_s = Line::through(t_s, speeds_rpm, is_usable).map_or(0.0, |line| line.slope);
     let acceleration_w = config.shaft_inertia_kgm2 * speed_rad_s * rad_s_of_rpm(slope_rpm_s);
-    let (heat_w, _) = balance.heat_w(state);
     let eta = point.eta.filter(|eta| *eta > 0.0);
     Some((Inputs { readings, eta, speed_rad_s, acceleration_w, heat_w }, samples))
 }
@@ -304,9 +310,7 @@ fn inputs(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::{
-        CommonErrors, DeclaredUncertainty, Method, OperatingPoint, Series, StepKind, confidence_interval_95,
-    };
+    use mapper_core::{CommonErrors, Method, OperatingPoint, Series, StepKind, confidence_interval_95};
 
     /// Steady states of the nominal model at openings 0.5 and 1 that a second implementation gave (docs/reference/model.md; T1 298.15 K, P1 100 kPa, T3
     /// 773.15 K, P4 110 kPa): speed rpm, P3 Pa, P2 Pa, Tc K, Tt K, compressor flow kg/s, turbine flow kg/s, efficiency, T2 K, T4 K. The power of
@@ -424,9 +428,10 @@ mod tests {
         turbine_points(recording, points.iter().map(|point| (point, errors)), config).0
     }
 
-    /// The reference efficiency of the compressor is the paper's (kappa of T1), and so is the closed form of its air.
+    /// The reference efficiency of the compressor is the paper's (kappa of T1), and so is the closed form of its air; all sensors are exact.
     fn paper() -> IdentifyConfig {
-        IdentifyConfig { air: Air::PAPER, ..IdentifyConfig::default() }
+        let exact = READINGS.map(|channel| (channel, DeclaredUncertainty::default()));
+        IdentifyConfig { air: Air::PAPER, declared: exact.into(), ..IdentifyConfig::default() }
     }
 
     #[test]
@@ -485,6 +490,30 @@ mod tests {
         };
         let (alone, together) = (error(&[]), error(&[(ReadingError::Offset(Channel::P2), change)]));
         assert!(alone > 0.01 && together.abs() < 0.03 * alone, "{alone} {together}");
+    }
+
+    /// A sensor that nobody declared is not exact.
+    #[test]
+    fn an_undeclared_sensor_has_the_error_of_a_usual_one() {
+        let half = |config: &IdentifyConfig| {
+            let point = all(&recording(), config, &[]).swap_remove(0);
+            point.efficiency_high.unwrap() - point.efficiency.unwrap()
+        };
+        let mut undeclared = paper();
+        undeclared.declared.remove(&Channel::P3);
+        // 600 Pa of the 11.2 kPa between P3 and P4 at 50 krpm: 5 % of the drop, and so of the efficiency of 0.67 (1.96 sigma).
+        let added = (half(&undeclared).powi(2) - half(&paper()).powi(2)).sqrt();
+        assert!((0.055..0.085).contains(&added), "{added}");
+    }
+
+    /// Heat to the compressor's housing counts as power then, and no interval contains it.
+    #[test]
+    fn an_apparent_efficiency_makes_no_good_turbine_point() {
+        let mut point = identified(2);
+        point.warnings.push(Warning::Apparent);
+        let config = paper();
+        let points = turbine_points(&recording(), std::iter::once((&point, &[][..])), &config).0;
+        assert_eq!(points[0].verdict, Verdict::Doubtful);
     }
 
     #[test]

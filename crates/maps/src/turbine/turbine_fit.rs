@@ -248,19 +248,8 @@ pub fn identified_turbine_map(
     machine: &str,
     points: &[&TurbinePoint],
 ) -> Result<TurbineMap, TurbineFitError> {
-    let mut used: Vec<&TurbinePoint> =
-        points.iter().copied().filter(|point| point.verdict != Verdict::Unusable).collect();
-    used.sort_by(|a, b| a.speed_parameter_rpm_sqrt_k.total_cmp(&b.speed_parameter_rpm_sqrt_k));
-    // Within a line, whose speeds vary by a per cent, points are in order of expansion.
-    let lines = used.chunk_by(|a, b| {
-        b.speed_parameter_rpm_sqrt_k <= TurbineMap::SAME_LINE_RATIO * a.speed_parameter_rpm_sqrt_k
-    });
-    let mut ordered: Vec<&TurbinePoint> = Vec::new();
-    for line in lines {
-        let mut line = line.to_vec();
-        line.sort_by(|a, b| a.expansion_ratio.total_cmp(&b.expansion_ratio));
-        ordered.extend(line);
-    }
+    let mut ordered = turbine_points_by_line(points);
+    ordered.retain(|point| point.verdict != Verdict::Unusable);
     let point = |point: &&TurbinePoint| TurbineMapPoint {
         vane_position: point.vane_position,
         speed_parameter_rpm_sqrt_k: point.speed_parameter_rpm_sqrt_k,
@@ -273,6 +262,18 @@ pub fn identified_turbine_map(
     let common: Vec<&TurbineCommonErrors> = ordered.iter().map(|point| &point.common).collect();
     let fitted = TurbineFit::with_common_errors(&map, &common)?.table(&map);
     Ok(TurbineMap { fitted: Some(fitted), ..map })
+}
+
+/// The points of each speed line in order of expansion, the slowest line first.
+pub fn turbine_points_by_line<'a>(points: &[&'a TurbinePoint]) -> Vec<&'a TurbinePoint> {
+    let mut ordered = points.to_vec();
+    ordered.sort_by(|a, b| a.speed_parameter_rpm_sqrt_k.total_cmp(&b.speed_parameter_rpm_sqrt_k));
+    // The speeds within a line vary by a per cent.
+    let lines = ordered.chunk_by_mut(|a, b| {
+        b.speed_parameter_rpm_sqrt_k <= TurbineMap::SAME_LINE_RATIO * a.speed_parameter_rpm_sqrt_k
+    });
+    lines.for_each(|line| line.sort_by(|a, b| a.expansion_ratio.total_cmp(&b.expansion_ratio)));
+    ordered
 }
 
 /// A point of a turbine map with its standard uncertainties.

@@ -43,7 +43,7 @@ const BLADE_SPEED_RATIOS: (f64, f64, f64) = (0.45, 0.9, 1e-5);
 const ANY_OUTLET_PA: f64 = 1e5;
 
 /// The turbine of a machine as identified: flow, and the parabola of the efficiency over the blade-speed ratio, from its points; the housing from its
-/// balance. The efficiency contains the bearing loss, so there is no friction. `None` with too few points.
+/// balance. The efficiency contains the bearing loss, so the bearing friction is 0. `None` with too few points.
 pub(crate) fn with_identified_turbine(
     declared: &Params,
     points: &[&TurbinePoint],

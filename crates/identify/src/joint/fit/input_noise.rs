@@ -5,6 +5,7 @@ use crate::joint::step_model::parameters::{
     LOGIT_INNER, PREHEAT, PROBE_MM2, Place, SHARED, SharedVector, TC_GAIN, TC_LAG,
 };
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// Parameters on which the effect of input noise depends, with the step of the derivative. Bound: small against the change of the effect.
 pub(crate) const BY_INPUT_NOISE: [(Place, f64); 11] = [
@@ -57,10 +58,11 @@ impl InputNoise {
     }
 }
 
-/// Cholesky factor of the covariance of a step's rows.
+/// Inverse of the Cholesky factor of the covariance of a step's rows.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Whitening {
-    lower: DMatrix<f64>,
+    /// Many blocks of columns are whitened by one factor, and a product takes a tenth of the time of a solution.
+    inverse: Arc<DMatrix<f64>>,
     /// Half the ln of the determinant.
     pub(crate) ln_spread: f64,
 }
@@ -68,14 +70,15 @@ pub(crate) struct Whitening {
 impl Whitening {
     /// `None` if the covariance is not positive definite.
     pub(crate) fn new(covariance: DMatrix<f64>) -> Option<Self> {
+        let rows = covariance.nrows();
         let lower = covariance.cholesky()?.unpack();
         let ln_spread = lower.diagonal().iter().map(|x| x.ln()).sum();
-        Some(Whitening { lower, ln_spread })
+        let inverse = lower.solve_lower_triangular(&DMatrix::identity(rows, rows))?;
+        Some(Whitening { inverse: Arc::new(inverse), ln_spread })
     }
 
-    /// Whitens columns in place.
-    pub(crate) fn apply(&self, columns: &mut DMatrix<f64>) {
-        // A Cholesky factor has no 0 on its diagonal.
-        self.lower.solve_lower_triangular_mut(columns);
+    /// Whitens columns.
+    pub(crate) fn apply(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        &*self.inverse * columns
     }
 }

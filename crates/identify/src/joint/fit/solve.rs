@@ -175,7 +175,7 @@ impl Member<'_> {
         for (place, index) in known.iter().enumerate() {
             all.column_mut(place + 1).copy_from_slice(&prediction.columns[*index]);
         }
-        self.whitening.apply(&mut all);
+        let all = self.whitening.apply(&all);
         let column = |place: usize| all.column(place).iter().copied().collect::<Vec<f64>>();
         let mut columns = vec![Vec::new(); prediction.columns.len()];
         known.iter().enumerate().for_each(|(place, index)| columns[*index] = column(place + 1));

@@ -7,6 +7,7 @@
 use crate::IdentifyConfig;
 use crate::joint::fit::input_noise::{BY_INPUT_NOISE, InputNoise, Whitening};
 use crate::joint::fit::solve::{Member, Problem};
+use crate::joint::step_model::gas_path::Wanted;
 use crate::joint::step_model::linearised::{Linearised, SmoothedInput, StepHistory};
 use crate::joint::step_model::parameters::{ETA, LOCAL, SHARED, SharedVector};
 use crate::joint::step_model::rows::{Basis, FLOW, P1, P2, SMOOTHED_COUNT, Smoothing, StepRows, T1, TC};
@@ -51,11 +52,12 @@ pub(crate) fn set(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<
         let member = &problem_now.members[*i];
         let readings_k = &predictions[*i].readings_k;
         let residual: Vec<f64> = member.measured_k.iter().zip(readings_k).map(|(a, b)| a - b).collect();
-        let linearised = |shared: &SharedVector| {
-            let wall = walls[*i].as_ref();
-            problem_now.model.linearised(&member.history, shared, &member.local, Some(false), wall).0
+        let linearised = |shared: &SharedVector, wanted: Wanted, known: Option<&Linearised<'_>>| {
+            let (history, at) = (&member.history, (shared, &member.local));
+            let paths = (known.is_none(), known);
+            problem_now.model.linearised(history, at, Some(wanted), walls[*i].as_ref(), paths).0
         };
-        let here = linearised(&problem_now.shared);
+        let here = linearised(&problem_now.shared, Wanted::Law, None);
         let (covariance, inputs) = covariance(problem_now, member, &here, &residual, config);
         let whitening = Whitening::new(covariance)?;
         let noise = match member.history.step.smoothing.as_ref() {
@@ -66,7 +68,7 @@ pub(crate) fn set(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<
                     &inputs,
                     (&member.history, smoothing),
                     (&whitening, &own),
-                    &linearised,
+                    &|moved| linearised(moved, Wanted::Readings, Some(&here)),
                 )?)
             }
             _ => None,
@@ -101,8 +103,7 @@ impl OwnPart {
     ) -> Option<Self> {
         let columns: Vec<DVector<f64>> =
             (0..LOCAL).map(|index| DVector::from_vec(linearised.by_local(index))).collect();
-        let mut columns = DMatrix::from_columns(&columns);
-        whitening.apply(&mut columns);
+        let columns = whitening.apply(&DMatrix::from_columns(&columns));
         let mut matrix = columns.tr_mul(&columns);
         for (index, prior) in member.priors.iter().enumerate() {
             let sigma = if index == ETA { problem.surface_sigma } else { prior.sigma };
@@ -134,8 +135,7 @@ fn input_noise<'a>(
         let basis = &smoothing.channels[part.place].values;
         let of_functions = part.variance * basis.tr_mul(&(part.noise * basis));
         let factor = of_functions.cholesky()?.unpack();
-        let mut rows = part.variance * &part.by_rows * (part.noise * basis);
-        whitening.apply(&mut rows);
+        let rows = whitening.apply(&(part.variance * &part.by_rows * (part.noise * basis)));
         let along = own.explained(&rows);
         now.push((rows, along, factor));
     }
@@ -152,9 +152,8 @@ fn input_noise<'a>(
         let mut parts = Vec::with_capacity(inputs.len());
         for (part, (rows, along, factor)) in inputs.iter().zip(&now) {
             let basis = &smoothing.channels[part.place];
-            let mut change =
-                (responses((&there, history), part.input, basis, &moved) - &part.responses) / step;
-            whitening.apply(&mut change);
+            let change = whitening
+                .apply(&((responses((&there, history), part.input, basis, &moved) - &part.responses) / step));
             slopes[index] += 2.0 * (change.dot(rows) - own.explained(&change).dot(along));
             parts.push(change * factor);
         }

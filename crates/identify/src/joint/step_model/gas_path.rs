@@ -85,18 +85,45 @@ pub(crate) struct GasPath {
     pub(crate) h_w_m2k: f64,
     /// Temperature at which the gas properties are taken, K.
     pub(crate) bulk_k: f64,
+    /// Heat capacity there, J/(kg K).
+    bulk_cp_j_kgk: f64,
+    /// h with a coefficient of 1, W/(m2 K), and the exponent of its law.
+    h_of_unit_w_m2k: f64,
+    exponent: f64,
+    /// Gas before the wheel and behind it, K.
+    wheel_k: (f64, f64),
+    inlet: InletGas,
 }
 
 /// The gas before the wheel.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct InletGas {
-    air: Air,
     rise_ratio: f64,
     cp_j_kgk: f64,
 }
 
 /// Derivatives of T2, heat to the wall and heat of the inlet by each input.
 pub(crate) type Slopes = [[f64; 3]; INPUT_COUNT];
+
+/// Which derivatives are wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Wanted {
+    /// Those by readings and efficiency.
+    Readings,
+    /// Also those by the law of convection and by what acts before the wheel.
+    Law,
+    /// Also those by the inlet's own law and by the humidity.
+    Model,
+}
+
+/// The gas path with another T1, another pressure ratio and another efficiency: what the derivatives spend their time on, and what no
+/// parameter of the law changes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Compressed {
+    other_t1: GasPath,
+    other_pressure: GasPath,
+    other_eta: GasPath,
+}
 
 /// Settings common to all steps.
 #[derive(Debug, Clone, Copy)]
@@ -121,39 +148,59 @@ pub(crate) fn reynolds(flow_kg_s: f64, diameter_m: f64, bulk_k: f64) -> f64 {
 }
 
 impl Setting {
-    /// What the gas path takes from pressures, T1 and humidity alone.
-    fn inlet(&self, inputs: &Inputs) -> InletGas {
-        let air = self
-            .air
+    fn air(&self, inputs: &Inputs) -> Air {
+        self.air
             .with_humidity(self.air.humidity_kg_kg() + inputs.humidity_kg_kg)
-            .between(inputs.p1_pa, inputs.p2_pa);
-        InletGas {
-            air,
-            rise_ratio: isentropic_rise_ratio(inputs.p2_pa / inputs.p1_pa, inputs.t1_k, air),
-            cp_j_kgk: air.heat_capacity_j_kgk(inputs.t1_k),
-        }
+            .between(inputs.p1_pa, inputs.p2_pa)
     }
 
     /// Eqs. 1-3 with the law of h, a heating/cooling ratio and an inlet that preheats.
     pub(crate) fn gas_path(&self, inputs: &Inputs, shared: &SharedVector) -> GasPath {
-        self.gas_path_from(&self.inlet(inputs), inputs, shared)
+        self.gas_path_near(None, inputs, shared)
     }
 
-    fn gas_path_from(&self, inlet: &InletGas, inputs: &Inputs, shared: &SharedVector) -> GasPath {
+    /// The same, with what `known` inputs and their path already have: properties, efficiency and wheel take most of the time, and most inputs
+    /// leave most of them as they are.
+    pub(crate) fn gas_path_near(
+        &self,
+        known: Option<(&Inputs, &GasPath)>,
+        inputs: &Inputs,
+        shared: &SharedVector,
+    ) -> GasPath {
         let Inputs { t1_k, wall_k, outer_k, flow_kg_s, .. } = *inputs;
-        let InletGas { air, rise_ratio, cp_j_kgk } = *inlet;
-        let efficiency = inputs.eta.max(MIN_ETA);
-        let bulk_k = compressed_k(t1_k, rise_ratio, efficiency, air);
-        let exponent = shared[EXPONENT];
-        let ln_coefficient = shared[LN_COEFFICIENT] + inputs.ln_h - exponent * self.reynolds_reference.ln();
-        let h_w_m2k = convection::coefficient_w_m2k(
-            ln_coefficient.exp(),
-            exponent,
-            self.outlet_diameter_m,
-            flow_kg_s,
-            bulk_k,
-            wall_k,
+        let before_compression = |x: &Inputs| (x.t1_k, x.p1_pa, x.p2_pa, x.humidity_kg_kg);
+        let same_inlet = known.filter(|(of, _)| before_compression(of) == before_compression(inputs));
+        let inlet = same_inlet.map_or_else(
+            || {
+                let air = self.air(inputs);
+                let rise_ratio = isentropic_rise_ratio(inputs.p2_pa / inputs.p1_pa, t1_k, air);
+                InletGas { rise_ratio, cp_j_kgk: air.heat_capacity_j_kgk(t1_k) }
+            },
+            |(_, path)| path.inlet,
         );
+        let InletGas { rise_ratio, cp_j_kgk } = inlet;
+        let efficiency = inputs.eta.max(MIN_ETA);
+        let same_bulk = same_inlet.filter(|(of, _)| of.eta == inputs.eta);
+        let (bulk_k, bulk_cp_j_kgk) = same_bulk.map_or_else(
+            || {
+                let air = self.air(inputs);
+                let bulk_k = compressed_k(t1_k, rise_ratio, efficiency, air);
+                (bulk_k, air.heat_capacity_j_kgk(bulk_k))
+            },
+            |(_, path)| (path.bulk_k, path.bulk_cp_j_kgk),
+        );
+        let exponent = shared[EXPONENT];
+        let same_h = same_bulk
+            .filter(|(of, path)| (of.wall_k, of.flow_kg_s, path.exponent) == (wall_k, flow_kg_s, exponent));
+        let h_of_unit_w_m2k = same_h.map_or_else(
+            || {
+                let diameter_m = self.outlet_diameter_m;
+                convection::coefficient_w_m2k(1.0, exponent, diameter_m, flow_kg_s, bulk_k, wall_k)
+            },
+            |(_, path)| path.h_of_unit_w_m2k,
+        );
+        let ln_coefficient = shared[LN_COEFFICIENT] + inputs.ln_h - exponent * self.reynolds_reference.ln();
+        let h_w_m2k = ln_coefficient.exp() * h_of_unit_w_m2k;
         let ln_inlet_ratio = || {
             let law = InletLaw {
                 exponent,
@@ -176,13 +223,31 @@ impl Setting {
         let (q1_w, after_area_k) = before_wheel(before_w_k, t1_k, wall_k, flow_kg_s, cp_j_kgk);
         let duct_w = inputs.preheat_w_k * (t1_k - outer_k);
         let t1_prime_k = after_area_k - duct_w / (flow_kg_s * cp_j_kgk);
-        let wheel =
-            Wheel { t1_k, isentropic_rise_ratio: rise_ratio, efficiency, recirculation_ratio: 0.0, air };
-        let (t2_prime_k, _) = wheel.compress(t1_prime_k);
+        let same_wheel = same_bulk.filter(|(_, path)| path.wheel_k.0 == t1_prime_k);
+        let t2_prime_k = same_wheel.map_or_else(
+            || {
+                let (isentropic_rise_ratio, air) = (rise_ratio, self.air(inputs));
+                Wheel { t1_k, isentropic_rise_ratio, efficiency, recirculation_ratio: 0.0, air }
+                    .compress(t1_prime_k)
+                    .0
+            },
+            |(_, path)| path.wheel_k.1,
+        );
         let after_w_k = directed_w_k(t2_prime_k) * (1.0 - inputs.alpha_area_ratio);
-        let (q2_w, t2_k) =
-            after_wheel(after_w_k, t2_prime_k, wall_k, flow_kg_s, air.heat_capacity_j_kgk(bulk_k));
-        GasPath { t2_k, wall_w: q1_w + q2_w, duct_w, h_w_m2k, bulk_k }
+        let (q2_w, t2_k) = after_wheel(after_w_k, t2_prime_k, wall_k, flow_kg_s, bulk_cp_j_kgk);
+        let wheel_k = (t1_prime_k, t2_prime_k);
+        GasPath {
+            t2_k,
+            wall_w: q1_w + q2_w,
+            duct_w,
+            h_w_m2k,
+            bulk_k,
+            bulk_cp_j_kgk,
+            h_of_unit_w_m2k,
+            exponent,
+            wheel_k,
+            inlet,
+        }
     }
 
     /// ln of the Reynolds number over the reference.
@@ -200,64 +265,75 @@ impl Setting {
         law.h_ratio(inputs.t1_k, path.bulk_k).ln()
     }
 
-    /// Conductance between gas and wall, W/K; `wall_w` is the heat at `inputs`.
-    pub(crate) fn wall_conductance_w_k(&self, inputs: &Inputs, wall_w: f64, shared: &SharedVector) -> f64 {
+    /// Heat from the gas to its wall, W, and the conductance between them, W/K.
+    pub(crate) fn wall_heat(&self, inputs: &Inputs, shared: &SharedVector) -> (f64, f64) {
+        let here = self.gas_path(inputs, shared);
         let step_k = SLOPE_STEP * inputs.wall_k;
         let hotter = Inputs { wall_k: inputs.wall_k + step_k, ..*inputs };
-        (wall_w - self.gas_path(&hotter, shared).wall_w) / step_k
+        let hotter_w = self.gas_path_near(Some((inputs, &here)), &hotter, shared).wall_w;
+        (here.wall_w, (here.wall_w - hotter_w) / step_k)
     }
 
-    /// The derivatives, by difference quotients. `with_model`: also those by the law before the wheel and the humidity, which are 0 otherwise.
+    /// The derivatives, by difference quotients, those that are not wanted 0. `known`: paths found before.
     pub(crate) fn slopes(
         &self,
         inputs: &Inputs,
         here: &GasPath,
+        known: Option<(&Inputs, &Compressed)>,
         shared: &SharedVector,
-        with_model: bool,
-    ) -> Slopes {
-        let inlet = self.inlet(inputs);
-        let quotient = |there: GasPath, step: f64| {
+        wanted: Wanted,
+    ) -> (Slopes, Compressed) {
+        let quotient = |there: &GasPath, step: f64| {
             [
                 (there.t2_k - here.t2_k) / step,
                 (there.wall_w - here.wall_w) / step,
                 (there.duct_w - here.duct_w) / step,
             ]
         };
-        // What leaves the gas before the wheel as it is.
-        let by = |moved: Inputs, step: f64| quotient(self.gas_path_from(&inlet, &moved, shared), step);
-        let by_inlet = |moved: Inputs, step: f64| quotient(self.gas_path(&moved, shared), step);
+        let by = |moved: Inputs, step: f64| {
+            quotient(&self.gas_path_near(Some((inputs, here)), &moved, shared), step)
+        };
+        let by_law =
+            |moved: Inputs, step: f64| if wanted >= Wanted::Law { by(moved, step) } else { [0.0; 3] };
+        let by_model =
+            |moved: Inputs, step: f64| if wanted >= Wanted::Model { by(moved, step) } else { [0.0; 3] };
         let x = *inputs;
         let kelvin = SLOPE_STEP * x.t1_k;
         let flow = SLOPE_STEP * x.flow_kg_s;
         let none = [0.0; 3];
+        let hotter = |x: &Inputs| Inputs { t1_k: x.t1_k + kelvin, ..*x };
+        let higher = |x: &Inputs| Inputs { p2_pa: x.p2_pa * SLOPE_STEP.exp(), ..*x };
+        let better = |x: &Inputs| Inputs { eta: x.eta + SLOPE_STEP, ..*x };
+        let compressed = |moved: &dyn Fn(&Inputs) -> Inputs, of: fn(&Compressed) -> &GasPath| match known {
+            Some((inputs, known)) => {
+                self.gas_path_near(Some((&moved(inputs), of(known))), &moved(&x), shared)
+            }
+            None => self.gas_path_near(Some((inputs, here)), &moved(&x), shared),
+        };
+        let other_t1 = compressed(&hotter, |known| &known.other_t1);
+        let other_pressure = compressed(&higher, |known| &known.other_pressure);
+        let other_eta = compressed(&better, |known| &known.other_eta);
         let is_hot_wall = x.wall_k > x.t1_k || x.wall_k > here.t2_k;
-        [
-            by_inlet(Inputs { t1_k: x.t1_k + kelvin, ..x }, kelvin),
+        let slopes = [
+            quotient(&other_t1, kelvin),
             by(Inputs { wall_k: x.wall_k + kelvin, ..x }, kelvin),
             if x.preheat_w_k == 0.0 { none } else { by(Inputs { outer_k: x.outer_k + kelvin, ..x }, kelvin) },
-            by_inlet(Inputs { p2_pa: x.p2_pa * SLOPE_STEP.exp(), ..x }, SLOPE_STEP),
+            quotient(&other_pressure, SLOPE_STEP),
             by(Inputs { flow_kg_s: x.flow_kg_s + flow, ..x }, flow),
-            by(Inputs { eta: x.eta + SLOPE_STEP, ..x }, SLOPE_STEP),
-            by(Inputs { ln_h: x.ln_h + SLOPE_STEP, ..x }, SLOPE_STEP),
-            by(Inputs { alpha_area_ratio: x.alpha_area_ratio + SLOPE_STEP, ..x }, SLOPE_STEP),
+            quotient(&other_eta, SLOPE_STEP),
+            by_law(Inputs { ln_h: x.ln_h + SLOPE_STEP, ..x }, SLOPE_STEP),
+            by_law(Inputs { alpha_area_ratio: x.alpha_area_ratio + SLOPE_STEP, ..x }, SLOPE_STEP),
             if is_hot_wall {
                 let ln_heating_cooling_ratio = x.ln_heating_cooling_ratio + SLOPE_STEP;
-                by(Inputs { ln_heating_cooling_ratio, ..x }, SLOPE_STEP)
+                by_law(Inputs { ln_heating_cooling_ratio, ..x }, SLOPE_STEP)
             } else {
                 none
             },
-            by(Inputs { preheat_w_k: x.preheat_w_k + SLOPE_STEP, ..x }, SLOPE_STEP),
-            if with_model {
-                by(Inputs { inlet_power: x.inlet_power + SLOPE_STEP, ..x }, SLOPE_STEP)
-            } else {
-                none
-            },
-            if with_model {
-                by_inlet(Inputs { humidity_kg_kg: x.humidity_kg_kg + SLOPE_STEP, ..x }, SLOPE_STEP)
-            } else {
-                none
-            },
-        ]
+            by_law(Inputs { preheat_w_k: x.preheat_w_k + SLOPE_STEP, ..x }, SLOPE_STEP),
+            by_model(Inputs { inlet_power: x.inlet_power + SLOPE_STEP, ..x }, SLOPE_STEP),
+            by_model(Inputs { humidity_kg_kg: x.humidity_kg_kg + SLOPE_STEP, ..x }, SLOPE_STEP),
+        ];
+        (slopes, Compressed { other_t1, other_pressure, other_eta })
     }
 }
 

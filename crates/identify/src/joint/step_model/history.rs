@@ -11,7 +11,7 @@
 //! when the run begins. Each parameter acts on a row by a few inputs of the gas path and of the housing; the chain rule gives its column, through
 //! wall, probe and integral.
 
-use crate::joint::step_model::gas_path::{Inputs, Slopes};
+use crate::joint::step_model::gas_path::{Inputs, Slopes, Wanted};
 use crate::joint::step_model::linearised::{
     Linearised, Model, RowState, StepHistory, WallRow, surface_of, tc_error_k,
 };
@@ -126,8 +126,8 @@ impl Model {
         before: Option<&Wall>,
     ) -> Prediction {
         let (linearised, start, end_k) = {
-            let with_model = active[INLET] || active[HUMIDITY];
-            self.linearised(history, shared, local, derivatives.then_some(with_model), before)
+            let wanted = if active[INLET] || active[HUMIDITY] { Wanted::Model } else { Wanted::Law };
+            self.linearised(history, (shared, local), derivatives.then_some(wanted), before, (false, None))
         };
         let mut readings_k = linearised.probe.read(&linearised.gas_k, local[FIRST_READING]);
         let exact_at = self.setting.exact_at;
@@ -154,14 +154,15 @@ impl Model {
         prediction
     }
 
-    /// The states along a step, the wall it starts from, and the wall at its end, K. `derivatives`: see [`Setting::slopes`].
+    /// The states along a step, the wall it starts from, and the wall at its end, K. `derivatives`: see [`Setting::slopes`]. `known`: the same
+    /// step with other parameters of the law, with the paths that it keeps.
     pub(crate) fn linearised<'a>(
         &'a self,
         history: &StepHistory<'a>,
-        shared: &SharedVector,
-        local: &LocalVector,
-        derivatives: Option<bool>,
+        (shared, local): (&SharedVector, &LocalVector),
+        derivatives: Option<Wanted>,
         before: Option<&Wall>,
+        (keeps, known): (bool, Option<&Linearised<'_>>),
     ) -> (Linearised<'a>, Option<Wall>, f64) {
         let step = history.step;
         let skipped = if self.has_inner_wall { 0 } else { step.lead.len() };
@@ -188,10 +189,16 @@ impl Model {
                 along = found;
                 wall_k = next_k;
             }
-            let path = self.setting.gas_path(&inputs, shared);
-            let slopes = match derivatives {
-                Some(with_model) => self.setting.slopes(&inputs, &path, shared, with_model),
-                None => Slopes::default(),
+            let known = known.and_then(|known| known.states.get(i));
+            let near = known.map(|state| (&state.inputs, &state.path));
+            let path = self.setting.gas_path_near(near, &inputs, shared);
+            let (slopes, compressed) = match derivatives {
+                Some(wanted) => {
+                    let known = known.and_then(|state| Some((&state.inputs, state.compressed.as_deref()?)));
+                    let (slopes, compressed) = self.setting.slopes(&inputs, &path, known, shared, wanted);
+                    (slopes, keeps.then(|| Box::new(compressed)))
+                }
+                None => (Slopes::default(), None),
             };
             let heat_w = self.housing.heat_w(row, inputs.outer_k, shared) + local[STEP_HEAT] + path.duct_w;
             let heat = if derivatives.is_some() {
@@ -209,6 +216,7 @@ impl Model {
             states.push(RowState {
                 path,
                 slopes,
+                compressed,
                 inputs,
                 rate_k_s,
                 outer_j_k,
@@ -229,8 +237,7 @@ impl Model {
         let mut wall_k = inputs.outer_k;
         for _ in 0..SETTLED_ROUNDS {
             let inputs = Inputs { wall_k, ..inputs };
-            let wall_w = self.setting.gas_path(&inputs, shared).wall_w;
-            let gas_w_k = self.setting.wall_conductance_w_k(&inputs, wall_w, shared);
+            let (wall_w, gas_w_k) = self.setting.wall_heat(&inputs, shared);
             wall_k += (wall_w - conductance_w_k * (wall_k - inputs.outer_k)) / (gas_w_k + conductance_w_k);
         }
         wall_k
@@ -245,8 +252,7 @@ impl Model {
         shared: &SharedVector,
     ) -> (f64, f64, WallRow) {
         let inputs = Inputs { wall_k: start_k, ..inputs };
-        let wall_w = self.setting.gas_path(&inputs, shared).wall_w;
-        let gas_w_k = self.setting.wall_conductance_w_k(&inputs, wall_w, shared);
+        let (wall_w, gas_w_k) = self.setting.wall_heat(&inputs, shared);
         let sum_w_k = gas_w_k + conductance_w_k;
         let inner_j_k = share * capacity_j_k;
         let settled_k = start_k + (wall_w - conductance_w_k * (start_k - inputs.outer_k)) / sum_w_k;

@@ -2,7 +2,7 @@
 
 use crate::config::Housing;
 use crate::joint::step_model::gas_path::{
-    GasPath, HEAT_PARAMETERS, INPUT_COUNT, Input, Inputs, Setting, Slopes,
+    Compressed, GasPath, HEAT_PARAMETERS, Input, Inputs, Setting, Slopes,
 };
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAINS, HUMIDITY, INLET, LN_CAPACITY,
@@ -45,6 +45,7 @@ pub(crate) struct StepHistory<'a> {
 pub(super) struct RowState {
     pub(super) path: GasPath,
     pub(super) slopes: Slopes,
+    pub(super) compressed: Option<Box<Compressed>>,
     pub(super) inputs: Inputs,
     /// Rate of Tc by the heat, K/s.
     pub(super) rate_k_s: f64,
@@ -69,10 +70,14 @@ pub(super) struct WallRow {
     pub(super) stored_w: f64,
 }
 
+/// Maximum number of inputs that a change moves. Source: [`Change`]'s constructors.
+const MOVED_INPUTS: usize = 2;
+
 /// A small change of what acts on a row.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(super) struct Change {
-    inputs: [f64; INPUT_COUNT],
+    /// Inputs of the gas path and by how much each changes.
+    inputs: [(Input, f64); MOVED_INPUTS],
     /// Heat from elsewhere, W.
     heat_w: f64,
     /// Tc without its errors, K; also in `inputs`.
@@ -82,11 +87,28 @@ pub(super) struct Change {
     ln_conductance: f64,
 }
 
+impl Default for Change {
+    fn default() -> Self {
+        Change {
+            inputs: [(Input::Eta, 0.0); MOVED_INPUTS],
+            heat_w: 0.0,
+            reading_k: 0.0,
+            ln_capacity: 0.0,
+            logit_inner: 0.0,
+            ln_conductance: 0.0,
+        }
+    }
+}
+
 impl Change {
     fn of(input: Input, by: f64) -> Self {
-        let mut change = Change::default();
-        change.inputs[input as usize] = by;
-        change
+        Change { inputs: [(input, by), (input, 0.0)], ..Change::default() }
+    }
+
+    /// With a change of another input.
+    fn and(mut self, input: Input, by: f64) -> Self {
+        self.inputs[1] = (input, by);
+        self
     }
 
     /// Of Tc as read.
@@ -170,8 +192,11 @@ impl Linearised<'_> {
         for (i, state) in self.states.iter().enumerate() {
             let Change { inputs, heat_w, reading_k, ln_capacity, logit_inner, ln_conductance } =
                 change(i, state);
-            let outer_k = inputs[Input::Outer as usize];
-            let by = |which: usize| (0..INPUT_COUNT).map(|k| state.slopes[k][which] * inputs[k]).sum::<f64>();
+            let outer_k: f64 =
+                inputs.iter().filter(|(input, _)| *input == Input::Outer).map(|(_, by)| by).sum();
+            let by = |which: usize| -> f64 {
+                inputs.iter().map(|(input, by)| state.slopes[*input as usize][which] * by).sum()
+            };
             let (mut t2_k, mut wall_w, duct_w) = (by(0), by(1), by(2));
             let mut row_wall_k = outer_k;
             if self.model.has_inner_wall {
@@ -237,11 +262,7 @@ impl Linearised<'_> {
                 SmoothedInput::P1 => Change::of(Input::LnPressureRatio, -value / state.inputs.p1_pa),
                 SmoothedInput::P2 => Change::of(Input::LnPressureRatio, value / state.inputs.p2_pa),
                 // The flow is also the place on the map.
-                SmoothedInput::Flow => {
-                    let mut change = Change::of(Input::Flow, value);
-                    change.inputs[Input::Eta as usize] = eta_by_flow(i) * value;
-                    change
-                }
+                SmoothedInput::Flow => Change::of(Input::Flow, value).and(Input::Eta, eta_by_flow(i) * value),
             }
         };
         self.respond(change, Some(0.0)).0
@@ -326,11 +347,7 @@ impl Linearised<'_> {
             BAROMETER => input(Input::LnPressureRatio, &|state, _| {
                 state.inputs.p1_pa.recip() - state.inputs.p2_pa.recip()
             }),
-            THERMOMETERS => with_t2(by(&|_, _, _| {
-                let mut change = Change::of_tc(-1.0);
-                change.inputs[Input::T1 as usize] = -1.0;
-                change
-            })),
+            THERMOMETERS => with_t2(by(&|_, _, _| Change::of_tc(-1.0).and(Input::T1, -1.0))),
             TC_LAG => by(&|_, row, _| Change::of_tc(row.tc_slope_k_s)),
             LN_CAPACITY => by(&|_, _, _| Change { ln_capacity: 1.0, ..Change::default() }),
             LOGIT_INNER => by(&|_, _, _| Change { logit_inner: 1.0, ..Change::default() }),

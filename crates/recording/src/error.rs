@@ -128,7 +128,7 @@ pub enum ReadWarning {
     StrayTimes { count: u64, first_s: f64 },
     #[error("{finding}")]
     Log { finding: LogFinding },
-    #[error("the log is faster than identification needs: it was averaged to 10 samples a second")]
+    #[error("the samples are faster than identification needs: they were averaged to 10 a second")]
     Averaged,
     #[error(
         "valve_command reverses in {turns_percent:.0} % of its samples, so it is a measured position; each step has the opening at its end"

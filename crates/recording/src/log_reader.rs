@@ -87,7 +87,8 @@ pub(crate) fn read_log(
             .collect(),
         ..LogContent::default()
     };
-    let mut blocks: Vec<BlockAverager> = members.iter().map(|_| BlockAverager::default()).collect();
+    let averager = || if options.averages { BlockAverager::default() } else { BlockAverager::never() };
+    let mut blocks: Vec<BlockAverager> = members.iter().map(|_| averager()).collect();
     let mut clocks: Vec<LogClock> = members.iter().map(|_| LogClock::default()).collect();
     let mut rows = 0u64;
     let mut take_row = |row: Row<'_>| {

@@ -129,7 +129,7 @@ fn read(
     open: &dyn Fn() -> io::Result<Box<dyn Read>>,
 ) -> Result<ReadReport, RecordError> {
     check_fits_mcap(map)?;
-    let (mut sink, scanned) = scan(path, open, options, || RigSink::new(path, map))?;
+    let (mut sink, scanned) = scan(path, open, options, || RigSink::new(path, map, options.averages))?;
     if let Some(error) = sink.failure.take() {
         return Err(error);
     }
@@ -137,6 +137,9 @@ fn read(
         return Err(RecordError::NothingReadable { path: path.to_owned(), warning });
     }
     let builders = sink.take_builders();
+    if sink.is_averaged() {
+        sink.warnings.push(ReadWarning::Averaged);
+    }
     // A command alone may match a name by chance: a recording without measurements is useless.
     let measured = builders.keys().any(|reads| reads.channel().info().group != Group::Command);
     let has_rig_topics = sink.topic_names.iter().any(|topic| !is_own_topic(topic));

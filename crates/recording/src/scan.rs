@@ -278,6 +278,8 @@ pub struct ReadOptions {
     pub max_messages: u64,
     /// Values beyond these are left out; a log with more in its mapped columns, after averaging, is refused.
     pub max_values: u64,
+    /// Whether samples that are faster than identification needs are averaged.
+    pub averages: bool,
     /// Formats of logs that are read in addition to MCAP.
     pub logs: LogFormats,
 }
@@ -290,6 +292,7 @@ impl Default for ReadOptions {
             max_chunk_bytes: 256 << 20,
             max_messages: 100_000_000,
             max_values: 64_000_000,
+            averages: true,
             logs: LogFormats::default(),
         }
     }

@@ -254,3 +254,28 @@ proptest! {
         prop_assert!(same(&truth.columns[0].values, &batch.truth[0].values));
     }
 }
+
+/// A recording at 100 Hz is read with ten samples a second, a ramp as the same ramp, and whole on request.
+#[test]
+fn a_fast_recording_is_averaged() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut fast = batch(6000);
+    fast.t_s = (0..6000).map(|i| f64::from(i) / 100.0).collect();
+    write(&path, &fast, &[step(0, 0.0, 60.0)]);
+    let report = read(&path);
+    assert_eq!(report.warnings, [ReadWarning::Averaged]);
+    for (column, series) in fast.columns.iter().zip(report.recording.series.values()) {
+        // The rows that show the rate are as they were.
+        assert!((600..670).contains(&series.t_s.len()), "{}", series.t_s.len());
+        assert!(series.t_s.is_sorted_by(|a, b| a < b));
+        let slope = (column.values[5999] - column.values[0]) / (fast.t_s[5999] - fast.t_s[0]);
+        for (t_s, value) in series.t_s.iter().zip(&series.values) {
+            assert!((value - column.values[0] - slope * t_s).abs() < 1e-6, "{t_s} {value}");
+        }
+    }
+    let options = ReadOptions { averages: false, ..ReadOptions::default() };
+    let whole = read_recording(&path, &ChannelMap::native(), &options).unwrap();
+    assert_eq!(whole.warnings, []);
+    assert!(whole.recording.series.values().all(|series| series.t_s == fast.t_s));
+}

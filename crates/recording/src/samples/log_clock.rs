@@ -158,15 +158,23 @@ enum State {
     /// The rate is not known yet.
     Undecided,
     Unchanged(RecentIntervals),
+    /// At any rate.
+    Never,
     Averaging(Block),
 }
 
-/// The latest intervals of a slow log.
+/// The latest intervals of a slow group.
 #[derive(Debug)]
 struct RecentIntervals {
     last_s: f64,
     /// A bit for each interval, set if it was short.
     short: u64,
+}
+
+impl Default for RecentIntervals {
+    fn default() -> Self {
+        RecentIntervals { last_s: f64::NAN, short: 0 }
+    }
 }
 
 impl RecentIntervals {
@@ -190,6 +198,16 @@ struct Block {
 }
 
 impl BlockAverager {
+    /// One that does not wait for the rate: its rows are unchanged until most of the latest intervals are short.
+    pub(crate) fn unbuffered() -> Self {
+        BlockAverager { first: Vec::new(), state: State::Unchanged(RecentIntervals::default()) }
+    }
+
+    /// One that leaves all rows as they are.
+    pub(crate) fn never() -> Self {
+        BlockAverager { first: Vec::new(), state: State::Never }
+    }
+
     pub(crate) fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
         match &mut self.state {
             State::Unchanged(intervals) => {
@@ -199,6 +217,7 @@ impl BlockAverager {
                 }
                 take(t_s, values);
             }
+            State::Never => take(t_s, values),
             State::Averaging(block) => block.push(t_s, values, take),
             State::Undecided => {
                 self.first.push((t_s, values.to_owned()));
@@ -230,7 +249,7 @@ impl BlockAverager {
         self.state = if typical_s * MAX_UNAVERAGED_HZ < 1.0 {
             State::Averaging(Block::default())
         } else {
-            State::Unchanged(RecentIntervals { last_s: f64::NAN, short: 0 })
+            State::Unchanged(RecentIntervals::default())
         };
         for (t_s, values) in std::mem::take(&mut self.first) {
             self.push(t_s, &values, take);

@@ -2,7 +2,8 @@
 
 use crate::channel_mapping::channel_map::{MappedQuantity, MappedTopic, map_topic};
 use crate::mcap::{ChannelDefinition, FieldValue, Sink, read_fields};
-use crate::samples::series_builder::SeriesBuilder;
+use crate::samples::log_clock::BlockAverager;
+use crate::samples::series_builder::{SeriesBuilder, run_time_s};
 use crate::steps::StepMessage;
 use crate::topics::{
     CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, OriginMessage, PLAN_NAME, PROVENANCE_TOPIC,
@@ -10,14 +11,15 @@ use crate::topics::{
 };
 use crate::{ChannelMap, FormatVersion, ReadWarning, RecordError};
 use mapper_core::Event;
+use mapper_core::unit_factors::NS_PER_S;
 use mapper_yaml::units::Unit;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The role of a topic for this reader.
 enum Topic {
-    /// Readings, with the index of each output's series.
-    Mapped(MappedTopic, Vec<usize>),
+    /// Readings, with the index of each output's series, averaged if they are fast.
+    Mapped(MappedTopic, Vec<usize>, BlockAverager),
     Step,
     Event,
     Provenance,
@@ -26,7 +28,7 @@ enum Topic {
 impl Topic {
     fn name(&self) -> &str {
         match self {
-            Topic::Mapped(mapped, _) => &mapped.topic,
+            Topic::Mapped(mapped, ..) => &mapped.topic,
             Topic::Step => STEP_TOPIC,
             Topic::Event => EVENT_TOPIC,
             Topic::Provenance => PROVENANCE_TOPIC,
@@ -58,6 +60,8 @@ pub(crate) struct PositionedMessage<T> {
 pub(crate) struct RigSink<'a> {
     path: &'a Path,
     map: &'a ChannelMap,
+    /// Whether fast readings are averaged.
+    averages: bool,
     topics: BTreeMap<u16, Topic>,
     pub(crate) topic_names: BTreeSet<String>,
     /// The topics to read, in the order in which the file defines them.
@@ -78,13 +82,16 @@ pub(crate) struct RigSink<'a> {
     value_count: u64,
     /// Number of messages so far.
     position: u64,
+    /// Time of the first readings, from which those of blocks count.
+    first_time_ns: Option<u64>,
 }
 
 impl<'a> RigSink<'a> {
-    pub(crate) fn new(path: &'a Path, map: &'a ChannelMap) -> Self {
+    pub(crate) fn new(path: &'a Path, map: &'a ChannelMap, averages: bool) -> Self {
         RigSink {
             path,
             map,
+            averages,
             topics: BTreeMap::new(),
             topic_names: BTreeSet::new(),
             series: Vec::new(),
@@ -102,6 +109,7 @@ impl<'a> RigSink<'a> {
             damaged: BTreeMap::new(),
             value_count: 0,
             position: 0,
+            first_time_ns: None,
         }
     }
 
@@ -112,8 +120,21 @@ impl<'a> RigSink<'a> {
             .map(|(topic, count)| ReadWarning::DamagedMessages { topic: topic.clone(), count: *count })
     }
 
+    /// Whether readings were averaged.
+    pub(crate) fn is_averaged(&self) -> bool {
+        self.topics.values().any(|topic| matches!(topic, Topic::Mapped(.., blocks) if blocks.is_averaging()))
+    }
+
     /// The non-empty series.
     pub(crate) fn take_builders(&mut self) -> BTreeMap<MappedQuantity, SeriesBuilder> {
+        let (position, zero_ns) = (self.position, self.first_time_ns.unwrap_or(0));
+        for topic in self.topics.values_mut() {
+            if let Topic::Mapped(_, builders, blocks) = topic {
+                blocks.finish(&mut |t_s, means| {
+                    push_means(&mut self.series, builders, position, (zero_ns, t_s), means);
+                });
+            }
+        }
         std::mem::take(&mut self.series).into_iter().filter(|(_, builder)| !builder.is_empty()).collect()
     }
 
@@ -133,7 +154,8 @@ impl<'a> RigSink<'a> {
                 self.units.extend(outputs.map(|(_, reads, unit)| (*reads, *unit)));
                 let mapped = mapped?;
                 let builders = mapped.outputs.iter().map(|(_, reads, _)| self.builder(*reads)).collect();
-                Some(Topic::Mapped(mapped, builders))
+                let blocks = if self.averages { BlockAverager::unbuffered() } else { BlockAverager::never() };
+                Some(Topic::Mapped(mapped, builders, blocks))
             }
             Err(error) => {
                 self.failure.get_or_insert(error);
@@ -165,7 +187,7 @@ impl Sink for RigSink<'_> {
 
     fn read(&self, channel_id: u16, data: &[u8]) -> Option<SinkMessage> {
         let content = match self.topics.get(&channel_id)? {
-            Topic::Mapped(mapped, _) => {
+            Topic::Mapped(mapped, ..) => {
                 let mut values = Vec::new();
                 read_fields(data, &mapped.fields, &mut values).then(|| {
                     let inside = |(index, _, unit): &(usize, MappedQuantity, &'static Unit)| match values
@@ -188,23 +210,39 @@ impl Sink for RigSink<'_> {
     }
 
     fn take(&mut self, channel_id: u16, log_time_ns: u64, content: SinkMessage) {
-        let Some(topic) = self.topics.get(&channel_id) else { return };
+        let Some(topic) = self.topics.get_mut(&channel_id) else { return };
         self.position += 1;
         let position = self.position;
         match (content, topic) {
-            (SinkMessage::Samples(values), Topic::Mapped(_, builders)) => {
-                for (value, builder) in values.iter().zip(builders) {
-                    let Some((_, builder)) = self.series.get_mut(*builder) else { continue };
-                    match value {
-                        FieldValue::Number(value) => builder.push_at(position, log_time_ns, *value),
-                        FieldValue::Other => {
-                            builder.push_at(position, log_time_ns, f64::NAN);
-                            builder.non_numeric_count += 1;
-                        }
-                        FieldValue::Absent => continue,
+            (SinkMessage::Samples(values), Topic::Mapped(_, builders, blocks)) => {
+                for (value, builder) in values.iter().zip(&*builders) {
+                    if let (FieldValue::Other, Some((_, builder))) = (value, self.series.get_mut(*builder)) {
+                        builder.non_numeric_count += 1;
                     }
-                    self.value_count += 1;
                 }
+                let zero_ns = *self.first_time_ns.get_or_insert(log_time_ns);
+                let numbers: Vec<f64> = values
+                    .iter()
+                    .map(|value| if let FieldValue::Number(number) = value { *number } else { f64::NAN })
+                    .collect();
+                let is_averaged = blocks.is_averaging();
+                let mut count = 0;
+                blocks.push(run_time_s(log_time_ns, zero_ns), &numbers, &mut |t_s, means| {
+                    if is_averaged {
+                        count += push_means(&mut self.series, builders, position, (zero_ns, t_s), means);
+                        return;
+                    }
+                    for (value, builder) in values.iter().zip(&*builders) {
+                        let Some((_, builder)) = self.series.get_mut(*builder) else { continue };
+                        match value {
+                            FieldValue::Number(value) => builder.push_at(position, log_time_ns, *value),
+                            FieldValue::Other => builder.push_at(position, log_time_ns, f64::NAN),
+                            FieldValue::Absent => continue,
+                        }
+                        count += 1;
+                    }
+                });
+                self.value_count += count;
             }
             (SinkMessage::Step(step), _) => {
                 self.value_count += values_of(size_of::<StepMessage>());
@@ -249,6 +287,25 @@ impl Sink for RigSink<'_> {
             _ => {}
         }
     }
+}
+
+/// Adds the means of a block, at a run time, to their series; returns the number of values.
+fn push_means(
+    series: &mut [(MappedQuantity, SeriesBuilder)],
+    builders: &[usize],
+    position: u64,
+    (zero_ns, t_s): (u64, f64),
+    means: &[f64],
+) -> u64 {
+    let time_ns = zero_ns.saturating_add_signed((t_s * NS_PER_S).round() as i64);
+    let mut count = 0;
+    for (mean, builder) in means.iter().zip(builders).filter(|(mean, _)| mean.is_finite()) {
+        if let Some((_, builder)) = series.get_mut(*builder) {
+            builder.push_at(position, time_ns, *mean);
+            count += 1;
+        }
+    }
+    count
 }
 
 /// Number of values of a series, with their times, that take the same memory.

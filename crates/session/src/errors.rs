@@ -212,6 +212,8 @@ pub enum SessionError {
     UnknownExtension { path: PathBuf, extension: String, known: Vec<&'static str> },
     #[error("{}: the extension belongs to no map format; use another extension, or name one of the formats {}", .path.display(), .known.join(", "))]
     UnknownOutputFormat { path: PathBuf, known: Vec<String> },
+    #[error("{}: samples are written to files with the extension {}", .path.display(), .known.join(", "))]
+    UnknownSampleFormat { path: PathBuf, known: Vec<&'static str> },
     #[error("`{0}` needs a fitted map: {1}")]
     Fit(&'static str, #[source] mapper_maps::MapFitError),
     #[error(transparent)]
@@ -336,6 +338,7 @@ impl SessionError {
             | E::UnknownFormat { .. }
             | E::UnknownExtension { .. }
             | E::UnknownOutputFormat { .. }
+            | E::UnknownSampleFormat { .. }
             | E::Fit(..)
             | E::Fmu(_)
             | E::FirstMap(_)

@@ -43,6 +43,7 @@ pub use mapper_runner::Operator;
 pub use nightly::{PreparedNight, night_report_link, night_report_path, night_runs, write_night_report};
 pub use plan::planning::{PlanInputs, nominal_model, plan, plan_of, stored_plan};
 pub use plan::rehearsal::{Rehearsal, rehearse};
+pub use recording::export::{Converted, convert_recording};
 pub use recording::files::{DIAGNOSIS_FORMAT, Existing, Versioned, json_text, write_file, write_new};
 pub use recording::identification_config::{declared, identification};
 pub use recording::recording_file::{Recorded, channel_map, check_all_distinct, inspect_log};

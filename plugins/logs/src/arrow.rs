@@ -1,15 +1,28 @@
 //! Arrow's files and streams (Feather, version 2).
 
-use crate::tables::record_batches::{Batches, open_log};
+use crate::tables::record_batches::{Batches, batch_of, open_log};
 use arrow_ipc::reader::{FileReader, StreamReader};
+use arrow_ipc::writer::FileWriter;
 use arrow_schema::{ArrowError, Schema};
-use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions};
+use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions, SampleTable};
+use std::io;
 
-pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+pub(crate) const FORMAT: LogFormat =
+    LogFormat { name: NAME, recognises, open, write: Some(("arrow", write)) };
 
 const NAME: &str = "Arrow";
 
 const FILE: &[u8] = b"ARROW1";
+
+fn write(table: &SampleTable) -> io::Result<Vec<u8>> {
+    let write = || -> Result<Vec<u8>, ArrowError> {
+        let batch = batch_of(table)?;
+        let mut writer = FileWriter::try_new(Vec::new(), &batch.schema())?;
+        writer.write(&batch)?;
+        writer.into_inner()
+    };
+    write().map_err(io::Error::other)
+}
 
 /// A stream begins with the marker of its first message and that message's length, which is below 16 MiB.
 fn recognises(head: &[u8]) -> bool {

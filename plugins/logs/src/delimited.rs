@@ -4,12 +4,33 @@ use crate::clock::HEAD_ROWS;
 use crate::tables::long_table::{LongForm, LongRows};
 use crate::tables::table_log::{Origin, Table};
 use crate::tables::table_row::RowStream;
-use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink};
+use mapper_recording::logs::{
+    Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink, SampleColumn, SampleTable,
+};
 use mapper_table::{Dialect, SEPARATORS, TextEncoding, decimal_sign, detect_text};
+use std::io;
 
-pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open, write: Some(("csv", write)) };
 
 const NAME: &str = "CSV";
+
+/// A table with its headings in the first row, separated by commas; an empty cell where there is no value.
+fn write(table: &SampleTable) -> io::Result<Vec<u8>> {
+    let mut text = csv::Writer::from_writer(Vec::new());
+    let headings = table.columns.iter().map(SampleColumn::heading);
+    text.write_record(std::iter::once(SampleTable::TIME.to_owned()).chain(headings))?;
+    let mut cells = Vec::with_capacity(table.columns.len() + 1);
+    for (row, t_s) in table.times_s.iter().enumerate() {
+        cells.clear();
+        cells.push(t_s.to_string());
+        cells.extend(table.columns.iter().map(|column| {
+            let value = column.values.get(row).filter(|value| value.is_finite());
+            value.map_or_else(String::new, f64::to_string)
+        }));
+        text.write_record(&cells)?;
+    }
+    text.into_inner().map_err(|error| error.into_error())
+}
 
 /// Size of the sample of a file, bytes.
 const HEAD_BYTES: usize = 1 << 18;

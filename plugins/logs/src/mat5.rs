@@ -9,7 +9,7 @@ use mapper_recording::logs::limits::{MAX_UNPACKED_BYTES, max_memory_bytes};
 use mapper_recording::logs::{Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};
 use std::io::Read;
 
-pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open, write: None };
 
 const NAME: &str = "MATLAB";
 

@@ -7,7 +7,7 @@ use mapper_recording::logs::{
 };
 use std::collections::BTreeSet;
 
-pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open, write: None };
 
 const NAME: &str = "MDF3";
 

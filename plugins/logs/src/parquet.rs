@@ -1,15 +1,31 @@
 //! Logs in Apache Parquet.
 
-use crate::tables::record_batches::{Batches, open_log};
+use crate::tables::record_batches::{Batches, batch_of, open_log};
 use arrow_schema::Schema;
 use mapper_recording::logs::limits::max_unpacked_bytes;
-use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions};
+use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions, SampleTable};
+use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+use std::io;
 
-pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+pub(crate) const FORMAT: LogFormat =
+    LogFormat { name: NAME, recognises, open, write: Some(("parquet", write)) };
 
 const NAME: &str = "Parquet";
+
+fn write(table: &SampleTable) -> io::Result<Vec<u8>> {
+    let batch = batch_of(table).map_err(io::Error::other)?;
+    let compression = Compression::ZSTD(ZstdLevel::default());
+    let properties = WriterProperties::builder().set_compression(compression).build();
+    let mut bytes = Vec::new();
+    let mut writer = ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties))?;
+    writer.write(&batch)?;
+    writer.close()?;
+    Ok(bytes)
+}
 
 /// Rows decoded at once.
 const BATCH_ROWS: usize = 8192;

@@ -12,7 +12,7 @@ use mapper_table::Instant;
 use std::io::{Seek as _, SeekFrom};
 use tedium::{ChannelPath, PropertyPath, PropertyValue, TdmsError, TdmsFile, TdmsStorageType};
 
-pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open, write: None };
 
 const NAME: &str = "TDMS";
 

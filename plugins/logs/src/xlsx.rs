@@ -10,7 +10,7 @@ use mapper_recording::logs::{
 };
 use mapper_table::{Book, SheetRows, Value, XLS_MAGIC, XlsxLimits, decimal_sign_of_cells};
 
-pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open, write: None };
 
 const NAME: &str = "Excel";
 

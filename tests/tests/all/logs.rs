@@ -264,3 +264,39 @@ fn all_mistakes_of_a_channel_map_are_reported_with_their_positions() {
     let header = identify("channels:\n  N: {field: n_TC}\n  P1: {field: p1, unit: mbar}\n");
     assert!(header.contains("write `gauge: true`") && header.contains(":3:"), "{header}");
 }
+
+/// A recording that was converted is the same recording: as a table, whose columns name themselves, and as a recording with its steps.
+#[test]
+fn a_converted_recording_gives_the_same_points() {
+    let run = Run::new();
+    let convert = |out: &Path, code: i32| {
+        mapper(["log".as_ref(), "convert".as_ref(), run.recording.as_os_str(), out.as_os_str()]).exits(code)
+    };
+    let points = |finished: Finished| -> Vec<Value> {
+        let found: Value = serde_json::from_str(&finished.exits(0).stdout).unwrap();
+        found["points"].as_array().unwrap().iter().map(|point| point["eta"].clone()).collect()
+    };
+    let campaign = run.campaign.path.as_os_str();
+    let identify = |file: &Path| {
+        mapper(["identify".as_ref(), file.as_os_str(), "--campaign".as_ref(), campaign, "--json".as_ref()])
+    };
+    let original = points(identify(&run.recording));
+    // No jump leads to the first point.
+    assert!(original.len() == 4 && original[1..].iter().all(Value::is_number), "{original:?}");
+
+    let (table, recording) = (run.file("converted.csv"), run.file("converted.mcap"));
+    convert(&table, 0);
+    convert(&recording, 0);
+    assert_eq!(points(identify(&recording)), original);
+    let from_table = points(run.identify(&table, &proposed(&table, "converted.yaml")));
+    assert_eq!(from_table.len(), original.len());
+    for (found, expected) in from_table.iter().zip(&original).skip(1) {
+        let difference = found.as_f64().unwrap() - expected.as_f64().unwrap();
+        assert!(difference.abs() < 1e-3, "{from_table:?} {original:?}");
+    }
+
+    let before = std::fs::read(&table).unwrap();
+    convert(&table, 1);
+    assert_eq!(std::fs::read(&table).unwrap(), before);
+    convert(&run.file("converted.xyz"), 2);
+}

@@ -1,4 +1,4 @@
-//! `mapper log`: what a log of another program contains.
+//! `mapper log`: what a log of another program contains, and its samples in another format.
 
 use crate::command_line::{key_and_value, subcommands};
 use crate::environment::registry;
@@ -6,11 +6,12 @@ use crate::output::failure::Failure;
 use crate::output::standard_output;
 use crate::output::standard_output::FileOutput;
 use clap::Args;
-use mapper_report::{log_contents, with_messages};
-use mapper_session::inspect_log;
+use mapper_recording::ChannelMap;
+use mapper_report::{Document, log_contents, with_messages};
+use mapper_session::{Converted, channel_map, convert_recording, inspect_log};
 use std::path::PathBuf;
 
-/// Look into the log of a test stand
+/// Look into the log of a test stand, or write its samples in another format
 #[derive(Debug, Args)]
 pub struct Log {
     #[command(subcommand)]
@@ -18,7 +19,7 @@ pub struct Log {
 }
 
 subcommands! { LogCommand:
-    Inspect,
+    Inspect, Convert,
 }
 
 impl Log {
@@ -60,6 +61,39 @@ impl Inspect {
             Some(file) => format!("The channel map is in {}.", file.display()),
             None => "Save it with `--write-channels FILE`.".to_owned(),
         });
+        standard_output::show(&document)
+    }
+}
+
+/// Write the samples of a log or recording in SI units, each channel under its symbol
+#[derive(Debug, Args)]
+pub struct Convert {
+    /// Log of a test stand, recording or run
+    pub log: PathBuf,
+    /// New file; its extension gives the format: csv, mcap, and parquet or arrow if the program was built with them
+    pub out: PathBuf,
+    /// Channel map of the log; `mapper log inspect --write-channels` writes one
+    #[arg(long, value_name = "FILE")]
+    pub channels: Option<PathBuf>,
+    #[command(flatten)]
+    pub output: FileOutput,
+}
+
+impl Convert {
+    pub fn run(&self) -> Result<(), Failure> {
+        let map = self.channels.as_deref().map_or_else(|| Ok(ChannelMap::native()), channel_map)?;
+        let converted = convert_recording(&registry(), &self.log, &map, (&self.out, self.output.existing()))?;
+        if self.output.json {
+            return standard_output::print_json(&converted);
+        }
+        let Converted { file, channels, rows, steps, duration_s, warnings } = converted;
+        let mut document = Document::default();
+        warnings.into_iter().for_each(|warning| document.text(warning));
+        document.text(format!(
+            "{}: {rows} rows over {duration_s:.1} s, {steps} steps, in SI units: {}.",
+            file.display(),
+            channels.join(", ")
+        ));
         standard_output::show(&document)
     }
 }

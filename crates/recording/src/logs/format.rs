@@ -34,6 +34,41 @@ pub trait Log {
 /// Opens a file as a log.
 pub type OpenLog = fn(&LogFile, &LogOptions) -> Result<Box<dyn Log>, LogError>;
 
+/// Samples as a table, for writing.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SampleTable {
+    /// Times, s, strictly increasing.
+    pub times_s: Vec<f64>,
+    /// The columns behind that of the times.
+    pub columns: Vec<SampleColumn>,
+}
+
+/// A column of a [`SampleTable`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SampleColumn {
+    /// Name, e.g. `T2`.
+    pub name: String,
+    /// Unit of its values; empty for a number.
+    pub unit: String,
+    /// One value per time, NaN where there is none.
+    pub values: Vec<f64>,
+}
+
+impl SampleColumn {
+    /// Name and unit as a heading, e.g. `T2 [K]`.
+    pub fn heading(&self) -> String {
+        if self.unit.is_empty() { self.name.clone() } else { format!("{} [{}]", self.name, self.unit) }
+    }
+}
+
+impl SampleTable {
+    /// Heading of the times.
+    pub const TIME: &'static str = "time [s]";
+}
+
+/// Writes a table as a file.
+pub type WriteSamples = fn(&SampleTable) -> io::Result<Vec<u8>>;
+
 /// One format of logs.
 #[derive(Debug, Clone, Copy)]
 pub struct LogFormat {
@@ -43,6 +78,8 @@ pub struct LogFormat {
     pub recognises: fn(&[u8]) -> bool,
     /// Opens a file of this format.
     pub open: OpenLog,
+    /// Extension and function of a format that can be written.
+    pub write: Option<(&'static str, WriteSamples)>,
 }
 
 /// The log formats of a program, in the order in which they are tried.
@@ -73,6 +110,20 @@ impl LogFormats {
             known: self.names(),
         })?;
         Ok((format, (format.open)(file, options)?))
+    }
+
+    /// The function that writes files with this extension.
+    pub fn writer(self, extension: &str) -> Option<WriteSamples> {
+        self.0
+            .iter()
+            .filter_map(|format| format.write)
+            .find(|(own, _)| *own == extension)
+            .map(|(_, write)| write)
+    }
+
+    /// Extensions of the formats that can be written.
+    pub fn extensions(self) -> impl Iterator<Item = &'static str> {
+        self.0.iter().filter_map(|format| format.write).map(|(extension, _)| extension)
     }
 
     /// Names of the formats, for messages.

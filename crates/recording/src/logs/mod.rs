@@ -13,6 +13,7 @@ mod survey;
 pub use finding::LogFinding;
 pub use format::{
     Column, Group, Layout, Log, LogError, LogFile, LogFormat, LogFormats, OpenLog, ReadSeek, Row, RowSink,
+    SampleColumn, SampleTable, WriteSamples,
 };
 pub use mapper_table::{difference, kind_of};
 pub use options::{LogOptions, OPTION_KEYS};

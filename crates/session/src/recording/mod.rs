@@ -1,5 +1,6 @@
 //! Files of a run and its recording: run directory, journal, resumption, and reading of recordings for the analysis.
 
+pub(crate) mod export;
 pub(crate) mod files;
 pub(crate) mod fusing;
 pub(crate) mod identification_config;

@@ -13,18 +13,30 @@ use arrow_array::types::{
     TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType,
     UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, RecordBatch};
+use arrow_array::{Array, Float64Array, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Field, Schema, TimeUnit};
-use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFinding, LogOptions, RowSink};
+use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFinding, LogOptions, RowSink, SampleTable};
 use mapper_table::{Instant, NS_PER_DAY};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Once;
+use std::sync::{Arc, Once};
 
 pub(crate) type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>>>;
 
 /// Opens a file from its start: its schema and its batches.
 pub(crate) type OpenBatches = fn(&LogFile) -> Result<(Schema, Batches), LogError>;
+
+/// A table of samples as one batch; a missing value is null.
+pub(crate) fn batch_of(table: &SampleTable) -> Result<RecordBatch, ArrowError> {
+    let mut fields = vec![Field::new(SampleTable::TIME, DataType::Float64, false)];
+    let mut columns: Vec<Arc<dyn Array>> = vec![Arc::new(Float64Array::from(table.times_s.clone()))];
+    for column in &table.columns {
+        fields.push(Field::new(column.heading(), DataType::Float64, true));
+        let values = column.values.iter().map(|value| value.is_finite().then_some(*value));
+        columns.push(Arc::new(values.collect::<Float64Array>()));
+    }
+    RecordBatch::try_new(Arc::new(Schema::new(fields)), columns)
+}
 
 struct BatchLog {
     file: LogFile,

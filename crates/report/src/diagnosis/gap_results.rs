@@ -71,9 +71,6 @@ pub fn correction(map: &CorrectedMap, diagnosis: &Diagnosis) -> Document {
                 100.0 * largest
             ));
         }
-        if diagnosis.probable_closure_term().is_some() {
-            document.text("A closure term was found: write it with `mapper gap diagnose --closure-terms DIR`, and correct with `--effect`.");
-        }
         document.section("Next experiment", next_section(diagnosis));
         return document;
     }
@@ -109,6 +106,15 @@ fn refusal(refused: &NotCorrected) -> String {
     let needed = 100.0 * CorrectedMap::NEEDED_PROBABILITY;
     match refused {
         NotCorrected::NoCause => "the diagnosis names no cause of its library".to_owned(),
+        NotCorrected::OfTheMachine => {
+            "the cause belongs to the machine itself, and its efficiency as recorded is the true one"
+                .to_owned()
+        }
+        NotCorrected::NotClosed { gap_reduction } => format!(
+            "the closure term removes {:.0} % of the gap on held-out steps, and {:.0} % are needed",
+            100.0 * gap_reduction,
+            100.0 * CorrectedMap::NEEDED_GAP_REDUCTION
+        ),
         NotCorrected::Improbable { probability } => {
             format!(
                 "the open causes have {:.0} % together, and {needed:.0} % are needed",

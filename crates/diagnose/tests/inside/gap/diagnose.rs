@@ -416,3 +416,18 @@ fn the_smallest_size_that_is_seen_is_seen() {
     };
     assert!(named(2.0) && !named(0.3), "{id} {value}");
 }
+
+/// 16 g/kg of water are declared, and the rig is dry.
+#[test]
+fn water_that_is_declared_and_absent_is_a_cause() {
+    let recording = record_of(&Rig::new(Model::nominal()), 5);
+    let mut model = Model::nominal();
+    model.params.compressor.humidity_kg_kg = 0.016;
+    let candidates = effects(&["humidity", "efficiency_scale", "flowmeter_gain", "recirculation"]);
+    let diagnosed = gap(request(&recording, declared(), model, candidates)).unwrap();
+    let first = &diagnosed.diagnosis.candidates[0];
+    assert_eq!(diagnosed.diagnosis.verdict, Verdict::Explained, "{:?}", diagnosed.diagnosis.candidates);
+    assert_eq!(first.effects, ["humidity"]);
+    let found = &first.parameters["humidity"];
+    assert!(found.low <= -0.016 && -0.016 <= found.high && found.high < 0.0, "{found:?}");
+}

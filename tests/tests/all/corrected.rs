@@ -1,10 +1,12 @@
 //! Diagnoses that are kept in a file, and maps that are corrected with them.
 
 use crate::pages::FOUR_POINTS;
-use mapper_tests::{CampaignFile, mapper, repository, scratch, shared_run};
+use mapper_tests::{CampaignFile, mapper, mapper_command, repository, scratch, shared_run};
 use serde_json::Value;
 use std::ffi::OsStr;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 /// Four points of the gap rig with a preheated inlet, which biases every efficiency.
 fn preheated() -> CampaignFile {
@@ -58,7 +60,7 @@ fn a_kept_diagnosis_corrects_as_a_new_one_and_only_its_own_recording() {
     let refused = |name: &str, text: &str, campaign: &Path, recording: &Path| {
         let file = scratch.path().join(name);
         std::fs::write(&file, text).unwrap();
-        let said = correct(campaign, recording, &["--diagnosis".as_ref(), file.as_os_str()]).exits(2).stderr;
+        let said = correct(campaign, recording, &["--diagnosis".as_ref(), file.as_os_str()]).exits(3).stderr;
         assert!(said.contains(name) && said.contains("diagnos"), "{said}");
     };
     let probability = text.find("\"probability\": 0.").unwrap() + "\"probability\": 0.".len();
@@ -90,4 +92,28 @@ fn a_kept_diagnosis_corrects_as_a_new_one_and_only_its_own_recording() {
     let ignored = correct(&campaign.path, &recording, &[]).exits(0);
     assert!(ignored.stderr.contains("night.diagnosis.json"), "{}", ignored.stderr);
     assert_eq!(ignored.json()["correction"], new["correction"]);
+}
+
+/// Ctrl-C during the search: the exit code of a stop, and no file.
+#[cfg(unix)]
+#[test]
+fn a_stopped_diagnosis_leaves_nothing() {
+    let (campaign, scratch) = (preheated(), scratch());
+    let recording = copied(&campaign, scratch.path(), "night.mcap");
+    let arguments = ["gap".as_ref(), "diagnose".as_ref(), campaign.path.as_os_str(), recording.as_os_str()];
+    let mut running = mapper_command(arguments)
+        .arg("--out")
+        .arg(scratch.path().join("kept.json"))
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut said = BufReader::new(running.stderr.take().unwrap()).lines().map(Result::unwrap);
+    said.find(|line| line.contains("single effects")).unwrap();
+    let id = running.id().to_string();
+    Command::new("sh").args(["-c", "kill -INT \"$1\"", "sh", &id]).status().unwrap();
+    assert!(said.any(|line| line.contains("stopped by the operator")));
+    assert_eq!(running.wait().unwrap().code(), Some(130));
+    let left = std::fs::read_dir(scratch.path()).unwrap().map(|entry| entry.unwrap().file_name());
+    assert_eq!(left.collect::<Vec<_>>(), ["night.mcap"]);
 }

@@ -36,15 +36,19 @@ pub(crate) struct Discovered {
     pub(crate) residual_sources: Vec<BalanceClosure>,
     /// Locations of the gap; `None` if the diagnosis' locations remain valid.
     pub(crate) places: Option<Vec<Place>>,
-    /// The first closure term fitted to all steps, if it is more probable than not, and those that the recording does not distinguish from it;
-    /// each with the index of its effect.
-    pub(crate) settled: Vec<(ClosureKey, usize, Fit)>,
+    /// The first closure term fitted to all steps, and those that the recording does not distinguish from it; each with the index of its effect.
+    pub(crate) fits: Vec<(ClosureKey, usize, Fit)>,
 }
 
 impl Discovered {
+    /// Whether a closure term is more probable than not.
+    pub(crate) fn is_settled(&self) -> bool {
+        self.closure_terms.first().is_some_and(|closure| closure.probability > 0.5)
+    }
+
     /// Without the closure terms; the locations that were found with them remain.
     pub(crate) fn without_terms(self) -> Discovered {
-        Discovered { closure_terms: Vec::new(), settled: Vec::new(), ..self }
+        Discovered { closure_terms: Vec::new(), fits: Vec::new(), ..self }
     }
 }
 
@@ -84,9 +88,9 @@ pub(crate) fn discover(
     let closure_terms = propose(library, calibration, &search, found.as_ref(), &training);
     // If a closure term leaves only noise, linear gains of other parts are irrelevant.
     let settled = closure_terms.first().filter(|closure| closure.probability > 0.5);
-    let alike = settled.map_or(0, |closure| 1 + closure.equivalent.len());
+    let alike = closure_terms.first().map_or(0, |closure| 1 + closure.equivalent.len());
     let fits = found.iter().flat_map(|found| &found.fitted).take(alike);
-    let settled_fits = fits.map(|one| (one.choice.key.clone(), one.effect, one.fit.clone())).collect();
+    let fits = fits.map(|one| (one.choice.key.clone(), one.effect, one.fit.clone())).collect();
     let bend = if settled.is_some() { 0.0 } else { LINEARISATION_ERROR_RATIO };
     progress(0.7, "residual source terms");
     let here = |balance: &Balance| {
@@ -102,7 +106,7 @@ pub(crate) fn discover(
             .map(reported_source)
             .collect(),
         places: Some(places),
-        settled: settled_fits,
+        fits,
     }
 }
 

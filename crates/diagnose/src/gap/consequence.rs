@@ -1,8 +1,7 @@
 //! The consequence of a diagnosis for the map: identified again without the causes if they are certain enough, else with wider intervals.
 
 use crate::drift::without_drift;
-use crate::gap::cause_fits::CauseFit;
-use crate::gap::changes::{Changes, one_sigma_away};
+use crate::gap::best_fit::fitted_causes::{CauseFit, Changes, one_sigma_away};
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::preconditions::GapError;
 use crate::gap::report::Candidate;
@@ -24,7 +23,7 @@ pub struct CorrectedMap {
 }
 
 impl CorrectedMap {
-    /// Minimum share of the gap that a closure term removes on held-out steps if a map is corrected for it. Judgement: the rest then has at most
+    /// Minimum share of the gap that a closure term removes on held-out steps if a map is corrected for it. Bound: the rest then has at most
     /// 45 % of the amplitude, which is added to the uncertainty of the correction.
     pub const NEEDED_GAP_REDUCTION: f64 = 0.8;
     /// Minimum probability of the causes by which a map is corrected. Judgement: of the diagnoses with a higher probability, 94 % are right on 2000 simulated
@@ -147,10 +146,13 @@ impl Diagnosed {
         // Nothing is refused only if there is a cause.
         let corrected = if refused.is_none() { after.into_iter().next() } else { None };
         let Some(identified) = corrected else {
-            let added: Vec<AddedUncertainty> = before_points
-                .iter()
-                .map(|point| self.by_open_causes(point, &causes, &points_after))
-                .collect();
+            let probabilities = causes.iter().map(|cause| cause.probability);
+            let mut open: Vec<(f64, Vec<IdentifiedPoint>)> = probabilities.zip(points_after).collect();
+            if let Some((weight, fit)) = self.imitation() {
+                open.push((weight, points(&without(&fit.hypothesis)?)));
+            }
+            let added: Vec<AddedUncertainty> =
+                before_points.iter().map(|point| self.by_open_causes(point, &open)).collect();
             let rows = before_points.iter().zip(&added);
             let rows = rows.map(|(point, added)| correction_of(Some(point), None, added.eta_sigma)).collect();
             return Ok(Correction {
@@ -179,21 +181,28 @@ impl Diagnosed {
         Ok(Correction { identified, map, added })
     }
 
-    /// What causes that are not corrected add to a point: what a correction for each of them would change, squared and weighted with its
-    /// probability, and the residual of T2 if no closure term describes a cause outside the library.
+    /// A closure term that removes most of the gap although its form is not the true one: it shows how far an outside cause may move the points.
+    /// With the probability of such a cause times what the term removes.
+    fn imitation(&self) -> Option<(f64, &CauseFit)> {
+        let Diagnosed { diagnosis, fits, .. } = self;
+        let term = diagnosis.closure_terms.first().filter(|_| diagnosis.is_outside_without_closure())?;
+        Some((diagnosis.probability_outside * term.gap_reduction, &fits.closures.first()?.fit))
+    }
+
+    /// What causes that are not corrected add to a point: what a correction for each of them (weight, points) would change, squared and
+    /// weighted, and the residual of T2 if no closure term describes a cause outside the library.
     fn by_open_causes(
         &self,
         point: &IdentifiedPoint,
-        causes: &[Candidate],
-        after: &[Vec<IdentifiedPoint>],
+        open: &[(f64, Vec<IdentifiedPoint>)],
     ) -> AddedUncertainty {
         let place = self.study.steps.iter().position(|step| step.marker.index == point.step);
         let residual = place
             .and_then(|place| Some(self.diagnosis.gap.points.get(place)?.eta_residual))
             .filter(|_| self.diagnosis.is_outside_without_closure());
         let sigma = |read: fn(&IdentifiedPoint) -> Option<f64>| {
-            let changes = causes.iter().zip(after).filter_map(|(cause, other)| {
-                Some(cause.probability * (read(same_step(other, point.step)?)? - read(point)?).powi(2))
+            let changes = open.iter().filter_map(|(weight, other)| {
+                Some(weight * (read(same_step(other, point.step)?)? - read(point)?).powi(2))
             });
             changes.sum::<f64>().sqrt()
         };

@@ -4,11 +4,10 @@ use crate::closure::discover::{Discovered, discover};
 use crate::drift::DriftReport;
 use crate::gap::baseline::Baseline;
 use crate::gap::best_fit::fit::Fit;
+use crate::gap::best_fit::fitted_causes::{CauseFit, ClosureFit, Fits, map_effect};
 use crate::gap::calibrated_model::Found;
-use crate::gap::cause_fits::{CauseFit, ClosureFit, Fits};
 use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::{Posterior, rivals, smallest_seen, suspicions, weight};
-use crate::gap::changes::map_effect;
 use crate::gap::experiment::{Experiment, GapWarning};
 use crate::gap::gap_reduction::{Compared, beyond_prior, held_out_gap};
 use crate::gap::library_fits::LibraryFits;
@@ -71,7 +70,8 @@ impl Diagnosed {
             let residual = linearised.residual(study, &prediction);
             Ok((prediction, residual))
         };
-        let closure = fits.closures.first().map(|closure| ("the closure term", &closure.fit));
+        let settled = diagnosis.probable_closure_term().and(fits.closures.first());
+        let closure = settled.map(|closure| ("the closure term", &closure.fit));
         let first = fits.causes.first().map(|cause| ("the most probable cause", cause));
         let with = closure.or(first).filter(|_| diagnosis.verdict != Verdict::WithinTolerance);
         let named = with.filter(|_| closure.is_some() || diagnosis.verdict != Verdict::Unexplained);
@@ -119,13 +119,14 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     // A change with time cannot be expressed as a closure term.
     let closure = if prepared.drift.is_some() { closure.without_terms() } else { closure };
     let is_outside_tolerance = verdict != Verdict::WithinTolerance;
+    let has_closure = closure.is_settled();
     let locations = match closure.places {
         _ if !is_outside_tolerance => Vec::new(),
         Some(places) => places,
         None => library.locations(&calibration, &posterior),
     };
     beyond(CLOSURE_END, "next experiment");
-    let open = OpenQuestion { verdict, locations: &locations, has_closure: !closure.settled.is_empty() };
+    let open = OpenQuestion { verdict, locations: &locations, has_closure };
     let Suggested { next, experiments } =
         next_experiment(&library, &posterior, open, &experiments, &calibration);
     let smallest_seen = match verdict {
@@ -158,7 +159,7 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     let best = library.fits.first().filter(|_| verdict.names_a_cause()).unwrap_or(&library.null);
     let found = Found::of(&library.study, best, diagnosis.doubt());
     let mut study = library.study.clone();
-    let closures = closure.settled.into_iter().filter_map(|(key, effect, fit)| {
+    let closures = closure.fits.into_iter().filter_map(|(key, effect, fit)| {
         let mut fit = CauseFit::of(&fit);
         let own = fit.hypothesis.effects.iter_mut().find(|(index, _)| *index == effect)?;
         own.0 = key.add_to(&mut study)?;
@@ -167,8 +168,9 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     let causes = posterior.probabilities.causes.iter().map(|cause| CauseFit::of(&library.fits[cause.set]));
     let fits =
         Fits { null: CauseFit::of(&library.null), causes: causes.collect(), closures: closures.collect() };
-    let closure = fits.closures.first().map(|closure| &closure.fit);
-    let cause = closure.or(fits.causes.first().filter(|_| verdict.names_a_cause()));
+    let settled = diagnosis.probable_closure_term().and(fits.closures.first());
+    let cause =
+        settled.map(|closure| &closure.fit).or(fits.causes.first().filter(|_| verdict.names_a_cause()));
     let Zeroed { recording, zero, .. } = prepared.zeroed;
     let map_effect = cause.and_then(|cause| map_effect(&study, cause, &recording, &rig.identification));
     let diagnosis = Diagnosis { map_effect, ..diagnosis };

@@ -4,9 +4,7 @@
 pub(crate) mod baseline;
 pub(crate) mod best_fit;
 pub(crate) mod calibrated_model;
-pub(crate) mod cause_fits;
 pub(crate) mod causes;
-pub(crate) mod changes;
 pub(crate) mod consequence;
 pub(crate) mod diagnose;
 pub(crate) mod experiment;

@@ -490,7 +490,7 @@ impl Suggestion {
 
 /// Probability below which a cause other than the first is not listed. Bound: it would be shown as "<0.5 %".
 pub(crate) const EXCLUDED: f64 = 0.005;
-/// Probability below which a cause other than the first is listed only on request. Judgement: one in twenty is what an interval excludes.
+/// Probability below which a cause other than the first is listed only on request. Bound: one in twenty is what an interval excludes.
 const LISTED: f64 = 0.05;
 /// Maximum number of candidates that are evaluated with refits: fits of the search, and experiments. Bound: effort.
 pub(crate) const MAX_REFITTED: usize = 7;

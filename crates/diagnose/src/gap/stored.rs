@@ -2,8 +2,8 @@
 
 use crate::closure::select::ClosureKey;
 use crate::drift::DriftReport;
+use crate::gap::best_fit::fitted_causes::{CauseFit, ClosureFit, Fits};
 use crate::gap::calibrated_model::Found;
-use crate::gap::cause_fits::{CauseFit, ClosureFit, Fits};
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::preconditions::{GapError, Zeroed};
 use crate::gap::report::{Candidate, Diagnosis};

@@ -62,7 +62,7 @@ pub fn correction(map: &CorrectedMap, diagnosis: &Diagnosis) -> Document {
         let largest = map.points.iter().map(|point| point.correction_sigma).fold(0.0, f64::max);
         if largest > 0.0 {
             let source = if diagnosis.is_outside_without_closure() {
-                "No closure term describes the cause: it may touch every point, and the residual of T2 widens"
+                "No closure term is certain enough: the cause may touch every point, and the residual of T2 and the nearest term widen"
             } else {
                 "What a correction would change, weighted with its probability, widens"
             };

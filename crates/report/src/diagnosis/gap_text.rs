@@ -275,7 +275,7 @@ fn map_effect(effect: &MapEffect) -> String {
         return "no efficiency reads wrong because of it".to_owned();
     }
     format!(
-        "efficiency at {:.0} krpm and opening {valve:.2} reads {:.1} +/- {:.1} points {}",
+        "from its step alone, efficiency at {:.0} krpm and opening {valve:.2} reads {:.2} +/- {:.2} points {}",
         speed_rpm / 1e3,
         100.0 * eta_error.abs(),
         100.0 * half_interval,

@@ -1,6 +1,6 @@
 //! Readings without the causes of a gap.
 
-use crate::gap::changes::Changes;
+use crate::gap::best_fit::fitted_causes::Changes;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::inside::gap::common::{Visits, declared, record_of};
 use mapper_core::{Channel, Recording};

@@ -2,14 +2,16 @@
 
 use crate::closure::library::library;
 use crate::closure::term::{Balance, ClosureEffect, Role, Term};
+use crate::drift::{Alternative, Cause, DriftReport, FoundDrift, RateOrStep};
 use crate::gap;
-use crate::gap::changes::Changes;
+use crate::gap::best_fit::fitted_causes::Changes;
 use crate::gap::residuals::study::Hypothesis;
 use crate::gap::{ClosureSearch, Diagnosed, Diagnosis, GapRequest, RestoreError, StoredFits};
 use crate::inside::gap::common::{Visits, declared, effects, record_of, request};
 use mapper_core::Recording;
 use mapper_physics::rig::effect::{Effect, Rig, add};
 use mapper_physics::simulation::model::Model;
+use serde_json::json;
 use std::sync::Arc;
 
 const VISITS: Visits = Visits { speeds_rpm: &[90e3, 140e3, 60e3, 120e3, 70e3, 130e3], dwell_s: 60.0 };
@@ -97,4 +99,27 @@ fn a_closure_term_from_a_file_subtracts_the_same() {
     let written = ask(&recording);
     assert!(!written.fits.closures.is_empty(), "{:?}", written.diagnosis.closure_terms);
     assert_same(&written, &again(&written, &recording, candidates()).unwrap());
+}
+
+/// Every cause of drift, as a rate and as a step.
+#[test]
+fn a_drift_from_a_file_is_that_of_the_diagnosis() {
+    let sizes = [RateOrStep::RatePerH(1.5), RateOrStep::Step(-0.25)];
+    for (cause, size) in Cause::all().into_iter().flat_map(|cause| sizes.map(|size| (cause, size))) {
+        let drift = FoundDrift {
+            cause,
+            probability: 0.875,
+            alternatives: vec![Alternative { cause: None, probability: 0.125 }],
+            onset_s: 60.0,
+            onset_low_s: 45.5,
+            onset_high_s: 75.0,
+            size,
+            low: -1.0,
+            high: 2.0,
+            unit: cause.unit().into(),
+        };
+        let report = DriftReport { drifts: vec![drift], ..DriftReport::without_verdict("why".to_owned()) };
+        let file = json!({"verdict": report.verdict, "drifts": report.drifts, "reason": report.reason});
+        assert_eq!(serde_json::from_str::<DriftReport>(&file.to_string()).unwrap(), report);
+    }
 }

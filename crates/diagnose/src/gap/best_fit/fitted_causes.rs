@@ -1,7 +1,8 @@
-//! What causes do to the readings of a recording, and to the efficiencies identified from them.
+//! Causes as fitted, and what they do to the readings of a recording and to the efficiencies identified from them.
 
+use crate::closure::select::ClosureKey;
 use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, unknowns};
-use crate::gap::cause_fits::CauseFit;
+use crate::gap::best_fit::fit::Fit;
 use crate::gap::report::MapEffect;
 use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
@@ -11,7 +12,42 @@ use mapper_observe::averages::{INPUT_CHANNELS, boundary_condition};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::effect::{EffectError, Rig};
 use mapper_physics::simulation::steady::Inputs;
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
+
+/// Causes with their sizes, as fitted to a recording.
+#[derive(Debug, Clone)]
+pub(crate) struct CauseFit {
+    /// Tolerances and effects, by their index in the study.
+    pub(crate) hypothesis: Hypothesis,
+    /// Covariance of the effects' search coordinates; `None` if the recording does not determine them.
+    pub(crate) covariance: Option<DMatrix<f64>>,
+}
+
+impl CauseFit {
+    pub(crate) fn of(fit: &Fit) -> CauseFit {
+        let covariance = Some(&fit.covariance).filter(|all| all.iter().all(|one| one.is_finite()));
+        CauseFit { hypothesis: fit.hypothesis.clone(), covariance: covariance.cloned() }
+    }
+}
+
+/// A closure term with its fit.
+#[derive(Debug, Clone)]
+pub(crate) struct ClosureFit {
+    pub(crate) key: ClosureKey,
+    pub(crate) fit: CauseFit,
+}
+
+/// The fits on which everything rests that follows from a diagnosis.
+#[derive(Debug, Clone)]
+pub(crate) struct Fits {
+    /// The tolerances alone.
+    pub(crate) null: CauseFit,
+    /// Those of the candidates, in their order.
+    pub(crate) causes: Vec<CauseFit>,
+    /// Those of the first closure term, and of those that the recording does not distinguish from it.
+    pub(crate) closures: Vec<ClosureFit>,
+}
 
 /// Effect of causes on the readings of a recording.
 #[derive(Debug, Clone, PartialEq)]

@@ -203,7 +203,7 @@ pub enum SessionError {
     #[error("{}: {why}", .path.display())]
     CalibratedModelFile { path: PathBuf, why: String },
     #[error("{}: {source}", .path.display())]
-    StoredDiagnosis { path: PathBuf, source: StoredDiagnosisError },
+    StoredDiagnosis { path: PathBuf, source: Box<StoredDiagnosisError> },
     #[error(transparent)]
     MapWork(#[from] MapWorkError),
     #[error("{}: {}", .0.display(), .1)]

@@ -119,7 +119,7 @@ pub fn found_in(path: &Path) -> Result<Found, SessionError> {
 }
 
 pub(crate) fn refused(path: &Path, source: StoredDiagnosisError) -> SessionError {
-    SessionError::StoredDiagnosis { path: path.to_owned(), source }
+    SessionError::StoredDiagnosis { path: path.to_owned(), source: Box::new(source) }
 }
 
 /// Where the diagnosis of a recording is looked for: `NAME.diagnosis.json` beside it.

@@ -19,6 +19,15 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
+/// Ctrl-C ends the process at once, with its exit code: for work that uses no rig and writes whole files.
+pub fn end_at_once() -> Result<(), Failure> {
+    let end = || {
+        standard_output::warn("\nstopped by the operator\n");
+        std::process::exit(Code::Interrupted as i32)
+    };
+    ctrlc::set_handler(end).map_err(failed)
+}
+
 /// Responds to a signal during a run.
 fn handle_signal(stop: &RunStop, gentle: bool) {
     match stop.handle_signal(gentle) {

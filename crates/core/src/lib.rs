@@ -23,7 +23,7 @@ pub use enums::UnknownName;
 pub use identification::identified::{
     BudgetRow, CommonErrors, EstimateUncertainty, IdentifiedPoint, Margins, Method, MethodResult,
     MethodResults, PointBudgets, ResultRemark, UncertaintyBudget, Verdict, Window, confidence_interval_95,
-    half_width_95, standard_error_of,
+    half_width_95, nan_where_null, standard_error_of,
 };
 pub use identification::settings::{
     ACCEPTANCE_WINDOW_S, ALPHA_AREA_SIGMA_RATIO, AcceptanceCriteria, Choice, JointSettings, ModelTolerances,

@@ -40,10 +40,11 @@ impl DiagnosisOptions {
     pub(crate) fn correct(&self, recording: &Recording, campaign: &Campaign) -> Result<Correction, Error> {
         let effects = recording.plugins.effects_with(&self.effects)?;
         let recorded = recording.only_part(campaign)?;
-        let given = (campaign.settings(), &recording.contents.channels);
+        let (settings, channels) = (campaign.settings(), &recording.contents.channels);
         let on_event = |event: &SessionEvent| self.show(event);
         let session = Session { on_event: &on_event, ..Session::new(&recording.plugins) };
-        let corrected = session.correct_gap(&recorded, given, effects, self.method, None)?;
+        let gap = session.diagnose_gap(&recorded, settings, channels, effects, None)?;
+        let corrected = session.correct_gap(gap, &recorded, channels, self.method, None)?;
         let described = Described::of(std::slice::from_ref(&recorded));
         Ok(Correction {
             diagnosis: Diagnosis { gap: corrected.gap },

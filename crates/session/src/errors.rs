@@ -5,7 +5,7 @@ use mapper_campaign::{
 };
 use mapper_core::{BackendError, ExportError, ImportError};
 use mapper_diagnose::drift::DriftError;
-use mapper_diagnose::gap::{CalibratedModelError, GapError};
+use mapper_diagnose::gap::{CalibratedModelError, GapError, RestoreError};
 use mapper_fmu::FmuError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
@@ -202,6 +202,8 @@ pub enum SessionError {
     /// The file is not a diagnosis or forecast, or has another hash than the pre-registered one.
     #[error("{}: {why}", .path.display())]
     CalibratedModelFile { path: PathBuf, why: String },
+    #[error("{}: {source}", .path.display())]
+    StoredDiagnosis { path: PathBuf, source: Box<StoredDiagnosisError> },
     #[error(transparent)]
     MapWork(#[from] MapWorkError),
     #[error("{}: {}", .0.display(), .1)]
@@ -378,7 +380,10 @@ impl SessionError {
             }
             E::Log(_) | E::NoPoints(..) | E::NoMap(..) => ErrorKind::BadRecording,
             E::CalibratedModel(CalibratedModelError::Gap(_)) => ErrorKind::BadRecording,
-            E::LogOption(_) | E::CalibratedModel(_) | E::CalibratedModelFile { .. } => ErrorKind::BadInput,
+            E::LogOption(_)
+            | E::CalibratedModel(_)
+            | E::CalibratedModelFile { .. }
+            | E::StoredDiagnosis { .. } => ErrorKind::BadInput,
             E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
                 ErrorKind::BadRecording
             }
@@ -395,6 +400,34 @@ impl SessionError {
             E::Interrupted => ErrorKind::Interrupted,
         }
     }
+}
+
+/// Why the file of a diagnosis cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum StoredDiagnosisError {
+    #[error("it is not a diagnosis of one recording ({0}): write one with `mapper gap diagnose --out FILE`")]
+    NotADiagnosis(String),
+    #[error(
+        "it was changed after it was written: its content does not have the SHA-256 in it; diagnose again"
+    )]
+    Changed,
+    #[error("it is of another version ({theirs}; this program is {ours}): diagnose again")]
+    Outdated { theirs: String, ours: String },
+    #[error(
+        "it belongs to another recording, or this one was changed or is read with another channel map: diagnose this one"
+    )]
+    OtherRecording,
+    #[error(
+        "the campaign is not the one of the diagnosis, or was changed since: give that campaign, or diagnose again"
+    )]
+    OtherCampaign,
+    #[error("it was made with other effects: give the same files with --effect, or diagnose again")]
+    OtherEffects,
+    #[error("it has only the changes since a reference recording: diagnose without --baseline")]
+    WithBaseline,
+    #[error(transparent)]
+    Restore(#[from] RestoreError),
 }
 
 /// Why a first campaign cannot get its nominal map.

@@ -19,15 +19,15 @@ mod rig;
 mod run;
 mod session;
 
-pub use crate::analysis::calibrated_model::{
-    CalibratedModel, SealedForecast, calibrated_model_campaign, found_in,
-};
+pub use crate::analysis::calibrated_model::{CalibratedModel, SealedForecast, calibrated_model_campaign};
 pub use crate::errors::{
-    ErrorKind, FirstMapError, FmuExportError, Input, MapWorkError, SessionError, since_text,
+    ErrorKind, FirstMapError, FmuExportError, Input, MapWorkError, SessionError, StoredDiagnosisError,
+    since_text,
 };
 pub use crate::machine::first_campaign::{FirstCampaignRequest, FirstRig};
 pub use crate::nightly::{DrawnMachine, NightlyRun};
 pub use crate::recording::files::{PROGRAM, program_and_commit};
+pub use analysis::diagnosis_file::{MadeFrom, diagnosis_of_run, found_in};
 pub use analysis::drift::Drift;
 pub use analysis::gap::Gap;
 pub use analysis::identification::Identified;

@@ -6,6 +6,7 @@
 
 mod circles;
 mod constants;
+mod corrected;
 mod dependencies;
 mod documentation;
 mod doomed;

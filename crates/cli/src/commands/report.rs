@@ -2,6 +2,7 @@
 
 use crate::command_line::RecordingReading;
 use crate::environment::registry;
+use crate::interrupt;
 use crate::output::failure::{Code, Failure};
 use crate::output::standard_output::FileOutput;
 use crate::output::{output_options, standard_output};
@@ -22,7 +23,8 @@ pub struct Report {
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub reading: RecordingReading,
-    /// Also diagnose the gap between the first run and the nominal model of this campaign, which takes up to a minute
+    /// Also show the gap between the first run and the nominal model of this campaign: the diagnosis that `gap diagnose` left beside the
+    /// recording, otherwise a new one, which takes up to a minute
     #[arg(long, value_name = "CAMPAIGN")]
     pub gap: Option<PathBuf>,
     /// Also print the page to a PDF next to it; needs Chromium on the path
@@ -76,7 +78,10 @@ fn diagnose(file: &Path, registry: &Registry, recorded: &Recorded, map: &Channel
     let progress = output_options::progress();
     let on_event = |event: &_| progress.show(event);
     let session = Session { on_event: &on_event, ..Session::new(registry) };
-    let gap = session.diagnose_gap(recorded, &campaign, map, effects, None);
+    interrupt::end_at_once()?;
+    let gap = session.gap(recorded, (&campaign, map), effects, None);
     progress.clear();
-    Ok(gap?)
+    let gap = gap?;
+    standard_output::warn_of_unused(&gap);
+    Ok(gap)
 }

@@ -6,7 +6,7 @@ use crate::output::standard_error::{say, wrap_for_terminal};
 use clap::Args;
 use mapper_core::{terminal_json, terminal_text};
 use mapper_report::{Document, with_messages};
-use mapper_session::{Existing, MapOut, MapWork, SessionError, write_file};
+use mapper_session::{Existing, Gap, MapOut, MapWork, SessionError, write_file};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -85,6 +85,13 @@ pub fn show(document: &Document) -> Result<(), Failure> {
 /// Writes warnings, already formatted, to standard error.
 pub fn warn(text: &str) {
     say(text);
+}
+
+/// States that the file beside a recording was not used, and why.
+pub fn warn_of_unused(gap: &Gap) {
+    if let Some(error) = &gap.not_used {
+        warn(&format!("diagnosed again: {error}\n"));
+    }
 }
 
 /// Writes the result of an operation on map files, and its assumptions as warnings.

@@ -1,9 +1,9 @@
 //! The number of a step: files and texts count from 1, code uses an index from 0.
 //!
-//! The serde adapters write the number and read it back as an index: this module for one step, or several that are only written; [`entry`] for
+//! The serde adapters write the number and read it back as an index: this module for one step or several; [`entry`] for
 //! plans and step markers, whose older files have the index.
 
-use serde::de::{Deserialize, Deserializer, Error};
+use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error};
 use serde::ser::{Serialize, Serializer};
 
 /// The number of the step at an index, from 1.
@@ -16,12 +16,18 @@ fn index_of<E: Error>(number: usize) -> Result<usize, E> {
 }
 
 /// Indices of steps, which files have as numbers.
-pub trait Steps {
+pub trait Steps: Sized {
     /// Their numbers, in the same form.
-    type Numbers: Serialize;
+    type Numbers: Serialize + DeserializeOwned;
 
     /// Their numbers.
     fn numbers(&self) -> Self::Numbers;
+
+    /// Their indices.
+    ///
+    /// # Errors
+    /// An error for step 0.
+    fn indices<E: Error>(numbers: Self::Numbers) -> Result<Self, E>;
 }
 
 impl Steps for usize {
@@ -29,6 +35,10 @@ impl Steps for usize {
 
     fn numbers(&self) -> usize {
         step_number(*self)
+    }
+
+    fn indices<E: Error>(number: usize) -> Result<usize, E> {
+        index_of(number)
     }
 }
 
@@ -38,6 +48,10 @@ impl<T: Steps> Steps for Option<T> {
     fn numbers(&self) -> Self::Numbers {
         self.as_ref().map(T::numbers)
     }
+
+    fn indices<E: Error>(numbers: Self::Numbers) -> Result<Self, E> {
+        numbers.map(T::indices).transpose()
+    }
 }
 
 impl<T: Steps> Steps for Vec<T> {
@@ -46,6 +60,10 @@ impl<T: Steps> Steps for Vec<T> {
     fn numbers(&self) -> Self::Numbers {
         self.iter().map(T::numbers).collect()
     }
+
+    fn indices<E: Error>(numbers: Self::Numbers) -> Result<Self, E> {
+        numbers.into_iter().map(T::indices).collect()
+    }
 }
 
 /// Writes the numbers of steps.
@@ -53,12 +71,12 @@ pub fn serialize<S: Serializer>(indices: &impl Steps, serializer: S) -> Result<S
     indices.numbers().serialize(serializer)
 }
 
-/// Reads a number from 1 as an index.
+/// Reads numbers from 1 as indices.
 ///
 /// # Errors
 /// The errors of the deserializer, and an error for step 0.
-pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
-    index_of(usize::deserialize(deserializer)?)
+pub fn deserialize<'de, T: Steps, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
+    T::indices(T::Numbers::deserialize(deserializer)?)
 }
 
 /// For a flattened field: `step` from 1. Files of version 0.1.0 have `index` from 0 instead.

@@ -4,7 +4,9 @@ use crate::closure::columns::{Base, Products};
 use crate::closure::description::{ClosureDescription, describe, script_of};
 use crate::closure::library as term_library;
 use crate::closure::residual_source::{ResidualSource, residual_sources};
-use crate::closure::select::{Choice, FittedClosure, TermSearch, begun, choices, keep_determined, promising};
+use crate::closure::select::{
+    Choice, ClosureKey, FittedClosure, TermSearch, begun, choices, keep_determined, promising,
+};
 use crate::closure::term::{Balance, Properties};
 use crate::gap::best_fit::fit::{Effort, Fit, adequacy, fit, misfit_of_steps, with_start_read};
 use crate::gap::best_fit::normal::Selection;
@@ -12,11 +14,11 @@ use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::place::{
     Explanation, Gain, LINEARISATION_ERROR_RATIO, Part, of_fits, places_of, rarity, signature,
 };
-use crate::gap::causes::probabilities::weight;
+use crate::gap::causes::probabilities::{candidate, weight};
 use crate::gap::causes::select::MIN_GAP_REDUCTION;
 use crate::gap::gap_reduction::{FOLDS, channels_on};
 use crate::gap::library_fits::LibraryFits;
-use crate::gap::report::{BalanceClosure, ClosureTerm, MAX_EQUIVALENT, Place};
+use crate::gap::report::{BalanceClosure, Candidate, ClosureTerm, MAX_EQUIVALENT, Place};
 use crate::gap::residuals::study::{Study, members};
 use crate::gap::verdict::Explained;
 use mapper_core::half_width_95;
@@ -34,14 +36,19 @@ pub(crate) struct Discovered {
     pub(crate) residual_sources: Vec<BalanceClosure>,
     /// Locations of the gap; `None` if the diagnosis' locations remain valid.
     pub(crate) places: Option<Vec<Place>>,
-    /// The first closure term fitted to all steps, if it is more probable than not.
-    pub(crate) settled: Option<Fit>,
+    /// The first closure term fitted to all steps, and those that the recording does not distinguish from it; each with the index of its effect.
+    pub(crate) fits: Vec<(ClosureKey, usize, Fit)>,
 }
 
 impl Discovered {
+    /// Whether a closure term is more probable than not.
+    pub(crate) fn is_settled(&self) -> bool {
+        self.closure_terms.first().is_some_and(|closure| closure.probability > 0.5)
+    }
+
     /// Without the closure terms; the locations that were found with them remain.
     pub(crate) fn without_terms(self) -> Discovered {
-        Discovered { closure_terms: Vec::new(), settled: None, ..self }
+        Discovered { closure_terms: Vec::new(), fits: Vec::new(), ..self }
     }
 }
 
@@ -64,9 +71,10 @@ pub(crate) fn discover(
     let mut found = found(&mut search, (library, calibration), &nothing, &training, &everywhere);
     progress(0.4, "a closure term together with a cause");
     let left = found.as_ref().is_none_or(|found| !found.adequate);
+    // Of effects that explain little, only one alone may be real: several imitate what is outside.
+    let is_candidate = |fit: &&Fit| explained == Explained::Most || fit.hypothesis.effects.len() == 1;
     if left
-        && explained == Explained::Most
-        && let Some(best) = library.fits.first()
+        && let Some(best) = library.fits.iter().find(is_candidate)
         && let Some(both) =
             together_with_cause(&mut search, (library, calibration), best, &training, &everywhere)
     {
@@ -80,8 +88,9 @@ pub(crate) fn discover(
     let closure_terms = propose(library, calibration, &search, found.as_ref(), &training);
     // If a closure term leaves only noise, linear gains of other parts are irrelevant.
     let settled = closure_terms.first().filter(|closure| closure.probability > 0.5);
-    let best = found.as_ref().and_then(|found| found.fitted.first());
-    let settled_fit = settled.and(best).map(|best| best.fit.clone());
+    let alike = closure_terms.first().map_or(0, |closure| 1 + closure.equivalent.len());
+    let fits = found.iter().flat_map(|found| &found.fitted).take(alike);
+    let fits = fits.map(|one| (one.choice.key.clone(), one.effect, one.fit.clone())).collect();
     let bend = if settled.is_some() { 0.0 } else { LINEARISATION_ERROR_RATIO };
     progress(0.7, "residual source terms");
     let here = |balance: &Balance| {
@@ -97,7 +106,7 @@ pub(crate) fn discover(
             .map(reported_source)
             .collect(),
         places: Some(places),
-        settled: settled_fit,
+        fits,
     }
 }
 
@@ -266,6 +275,7 @@ fn propose(
     let script = script_of(&best.terms(&search.library), &description);
     let ClosureDescription { sentence, terms, .. } = description;
     let others = found.fitted[..alike].iter().skip(1).take(MAX_EQUIVALENT);
+    let beside = accompanying_cause(calibration, &search.study, best);
     vec![ClosureTerm {
         submodel: search.library[best.choice.terms[0]].submodel().name().to_owned(),
         sentence,
@@ -275,7 +285,8 @@ fn propose(
         held_out_steps: held_out.len(),
         channels,
         worse,
-        beside: accompanying_effects(study, best),
+        beside: beside.as_ref().map(|cause| cause.effects.clone()).unwrap_or_default(),
+        beside_cause: beside,
         stability: found.stability,
         equivalent: others.map(|closure| describe(closure).sentence).collect(),
         rhai: None,
@@ -283,10 +294,18 @@ fn propose(
     }]
 }
 
-/// Library effects fitted together with a closure term.
-fn accompanying_effects(study: &Study, closure: &FittedClosure) -> Vec<String> {
-    let others = closure.fit.hypothesis.effects.iter().filter_map(|(index, _)| study.effects.get(*index));
-    others.map(|effect| effect.info().id.to_string()).collect()
+/// The library effects fitted together with a closure term; `None` if it was found alone.
+fn accompanying_cause(
+    calibration: &Calibration,
+    study: &Study,
+    closure: &FittedClosure,
+) -> Option<Candidate> {
+    let mut hypothesis = closure.fit.hypothesis.clone();
+    hypothesis.effects.retain(|(index, _)| *index != closure.effect);
+    // The closure term's coordinates are the last of the fit.
+    let covariance = Some(&closure.fit.covariance);
+    (!hypothesis.effects.is_empty())
+        .then(|| candidate(calibration, &study.effects, &hypothesis, covariance, 1.0))
 }
 
 /// Prior of all closure terms together. Judgement: one gap in seven is none of the library's effects and has a physical term.

@@ -2,6 +2,7 @@
 
 use crate::closure::columns::{Base, LinearEvidence, Products, linear_evidence};
 use crate::closure::expression::{Expression, Spans, product};
+use crate::closure::library::library;
 use crate::closure::residual_source::in_each_step;
 use crate::closure::term::{ClosureEffect, Role, Term};
 use crate::gap::best_fit::fit::{Effort, Fit, Start, fit};
@@ -16,6 +17,7 @@ use mapper_numerics::parallel;
 use mapper_numerics::statistics::HINT_SIGMAS;
 use mapper_physics::rig::effect::Effect;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Some library terms, by index, with their fit to the recording.
@@ -31,6 +33,30 @@ pub(crate) struct Choice {
     pub(crate) begin: usize,
     /// Coefficients, in steps.
     pub(crate) coefficients: Vec<f64>,
+    /// The same terms without their onset, by which a file names them.
+    pub(crate) key: ClosureKey,
+}
+
+/// Terms of the library, by index, that begin with a step; 0 from the beginning.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ClosureKey {
+    terms: Vec<usize>,
+    begin: usize,
+}
+
+impl ClosureKey {
+    /// Adds the closure term to a study, and returns the index of its effect; `None` for a term or a step that does not exist.
+    pub(crate) fn add_to(&self, study: &mut Study) -> Option<usize> {
+        let library = library();
+        let begin_s = study.steps.get(self.begin)?.marker.start_s;
+        let term = |place: &usize| {
+            let term = library.get(*place)?;
+            Some(if self.begin > 0 { from(term, begin_s, self.begin) } else { term.clone() })
+        };
+        let terms = self.terms.iter().map(term).collect::<Option<Vec<Term>>>()?;
+        Some(study.add(Arc::new(ClosureEffect::new(terms))))
+    }
 }
 
 /// All closure terms of one term, and of two in the same machine part; best first. `usable` are the library indices of the products' columns.
@@ -46,7 +72,8 @@ pub(crate) fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64
             terms.iter().zip(coefficients.iter()).any(|(term, c)| library[*term].positive && *c < 0.0);
         if !wrong && gain.is_finite() {
             let coefficients = coefficients.iter().copied().collect();
-            found.push(Choice { terms, gain: gain - rarity, rarity, begin: 0, coefficients });
+            let key = ClosureKey { terms: terms.clone(), begin: 0 };
+            found.push(Choice { terms, gain: gain - rarity, rarity, begin: 0, coefficients, key });
         }
     };
     let simple = (usable.len() as f64).ln();
@@ -148,6 +175,7 @@ pub(crate) fn begun(
                         begin,
                         coefficients,
                         terms: choice.terms.clone(),
+                        key: ClosureKey { begin, ..choice.key.clone() },
                     });
                 }
             }

@@ -8,7 +8,7 @@ use mapper_observe::perturbation::Perturbation;
 use mapper_physics::laws::turbine::at_150_krpm;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::rig::sensor_fault::drifts;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// A possible cause of drift.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -135,6 +135,14 @@ impl std::fmt::Display for Cause {
 impl Serialize for Cause {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for Cause {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Cause, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        let known = Cause::all().into_iter().find(|cause| cause.name() == name);
+        known.ok_or_else(|| serde::de::Error::custom(format!("`{name}` is no cause of drift")))
     }
 }
 

@@ -137,6 +137,8 @@ pub(crate) fn conclude(
     let decision = &refined.decision;
     let points: Vec<Vec<IdentifiedPoint>> =
         recordings.iter().map(|recording| identified(recording, request)).collect();
+    let first_visits = groups.iter().filter_map(|visits| refined.readings.steps.get(*visits.first()?));
+    let unseen_before_s = first_visits.map(|step| step.end_s + step.offset_s).reduce(f64::min);
     let groups =
         groups.iter().map(|visits| group(request, recordings, &refined.readings, &points, visits)).collect();
     let drifts: Vec<FoundDrift> =
@@ -149,6 +151,7 @@ pub(crate) fn conclude(
         reason: reason(decision, &drifts, verdict),
         drifts,
         alone: decision.alone.clone(),
+        unseen_before_s,
         detection_limits: decision.limits.clone(),
         groups,
         corrected_points,
@@ -170,7 +173,7 @@ fn drift(detected: &DetectedCause, fit: &FittedDrift) -> FoundDrift {
         },
         low: fit.low,
         high: fit.high,
-        unit: cause.unit(),
+        unit: cause.unit().into(),
     }
 }
 

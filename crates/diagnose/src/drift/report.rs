@@ -2,11 +2,12 @@
 
 use crate::drift::causes::{Cause, RATE_PER_H};
 use mapper_inference::hypotheses::{Shape, TimeHistory};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// The verdict.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DriftVerdict {
     /// No drift is more probable than any drift.
@@ -23,7 +24,7 @@ pub enum DriftVerdict {
 }
 
 /// Rate or step size.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RateOrStep {
     /// Change per hour.
@@ -33,7 +34,7 @@ pub enum RateOrStep {
 }
 
 /// A cause with its probability.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
     /// The cause; `None` means no drift.
     pub cause: Option<Cause>,
@@ -129,7 +130,7 @@ pub struct CorrectedPoint {
 }
 
 /// A detected drift.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FoundDrift {
     /// The cause.
     pub cause: Cause,
@@ -151,7 +152,7 @@ pub struct FoundDrift {
     /// Upper end.
     pub high: f64,
     /// Unit of the drifting quantity; a rate is per hour.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
 }
 
 impl FoundDrift {
@@ -170,8 +171,9 @@ impl FoundDrift {
     }
 }
 
-/// The drift report of a campaign.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+/// The drift report of a campaign. From a file it has only what is subtracted: verdict, drifts and reason.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct DriftReport {
     /// The verdict.
     pub verdict: DriftVerdict,
@@ -181,11 +183,16 @@ pub struct DriftReport {
     pub alone: Vec<Alternative>,
     /// Sentences: why there is no verdict, or the causes and the corrections.
     pub reason: String,
+    /// End of the first repeated visit, campaign time, s: a change before it is in all visits and is not seen. `None` without repeats.
+    pub unseen_before_s: Option<f64>,
     /// Smallest detectable drift, per cause.
+    #[serde(skip_deserializing)]
     pub detection_limits: Vec<DetectionLimit>,
     /// Repeated jumps.
+    #[serde(skip_deserializing)]
     pub groups: Vec<RepeatGroup>,
     /// Map points corrected for the drifts; empty if nothing drifts.
+    #[serde(skip_deserializing)]
     pub corrected_points: Vec<CorrectedPoint>,
 }
 

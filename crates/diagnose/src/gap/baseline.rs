@@ -18,7 +18,7 @@ use mapper_observe::model_inputs::step_timing::with_command_times;
 use mapper_observe::perturbation::UNINFORMATIVE;
 use mapper_physics::simulation::model::Model;
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A study of the changes since the reference recording.
@@ -138,7 +138,7 @@ fn partners(study: &Study, other: &Study) -> Vec<Option<usize>> {
 }
 
 /// Baseline of a rig: its model error in fault-free condition.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Baseline {
     /// The reference recording.
     pub recording: String,
@@ -147,7 +147,7 @@ pub struct Baseline {
 }
 
 /// Errors of the model's equations, as a campaign declares them.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Declaration {
     /// `offset` of the sensor, in the channel's unit: the mean error of the equations, if it is larger than the declared offset.
     pub offset: Option<f64>,
@@ -156,7 +156,7 @@ pub struct Declaration {
 }
 
 /// Model error of one channel.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Lacking {
     /// Root mean square, in the channel's unit.
     pub size: f64,

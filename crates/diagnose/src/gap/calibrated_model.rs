@@ -1,12 +1,10 @@
 //! Calibrated model: machine, effects and tolerances from a diagnosis, its forecasts, and their verification.
 
 use crate::gap::best_fit::coordinate::{coordinates, infos};
-use crate::gap::best_fit::fit::{changes_near, effect_changes};
+use crate::gap::best_fit::fit::{Fit, changes_near, effect_changes};
 use crate::gap::causes::additions::Calibration;
-use crate::gap::diagnose::Diagnosed;
 use crate::gap::next_experiment::{SimulatedRig, simulated_steps};
 use crate::gap::preconditions::{GapError, Prepared};
-use crate::gap::report::Verdict;
 use crate::gap::request::RigRecording;
 use crate::gap::residuals::nuisance::{Nuisance, OFFSET_PREFIX, OUTPUTS};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
@@ -89,11 +87,9 @@ pub enum CalibratedModelError {
 }
 
 impl Found {
-    /// Result of a diagnosis; `None` if the covariance cannot be formed.
-    pub fn of(diagnosed: &Diagnosed) -> Option<Found> {
-        let named = matches!(diagnosed.diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
-        let fit = diagnosed.fits.first().filter(|_| named).unwrap_or(&diagnosed.null);
-        let (study, Hypothesis { nuisances, effects }) = (&diagnosed.study, &fit.hypothesis);
+    /// The machine of a fit; `None` if the covariance cannot be formed.
+    pub(crate) fn of(study: &Study, fit: &Fit, doubt: Option<String>) -> Option<Found> {
+        let Hypothesis { nuisances, effects } = &fit.hypothesis;
         let covariance = fit.precision.clone().cholesky()?.inverse();
         let tolerance = |(nuisance, sigmas): (&Nuisance, &f64)| FoundTolerance {
             name: nuisance.kind.to_string(),
@@ -107,7 +103,7 @@ impl Found {
             effects,
             tolerances: study.nuisances.iter().zip(nuisances).map(tolerance).collect(),
             covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
-            doubt: diagnosed.diagnosis.doubt(),
+            doubt,
         })
     }
 

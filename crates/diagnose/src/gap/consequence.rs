@@ -1,23 +1,15 @@
 //! The consequence of a diagnosis for the map: identified again without the causes if they are certain enough, else with wider intervals.
 
 use crate::drift::without_drift;
-use crate::gap::best_fit::coordinate::{coordinates, hypothesis_at, infos, unknowns};
-use crate::gap::best_fit::fit::Fit;
+use crate::gap::best_fit::fitted_causes::{CauseFit, Changes, one_sigma_away};
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::preconditions::GapError;
-use crate::gap::report::{Candidate, Verdict};
-use crate::gap::residuals::nuisance::{Circumstances, OUTPUTS};
-use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
+use crate::gap::report::Candidate;
+use crate::gap::residuals::nuisance::Hypothesis;
 use mapper_core::{
-    BudgetRow, Channel, IdentifiedPoint, PointBudgets, Recording, Series, UncertaintyBudget, half_width_95,
-    step_number,
+    BudgetRow, IdentifiedPoint, PointBudgets, Recording, UncertaintyBudget, half_width_95, step_number,
 };
-use mapper_observe::averages::{INPUT_CHANNELS, boundary_condition};
-use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::rig::effect::{EffectError, Rig};
-use mapper_physics::simulation::steady::Inputs;
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 /// A map before and after its correction for causes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -31,6 +23,9 @@ pub struct CorrectedMap {
 }
 
 impl CorrectedMap {
+    /// Minimum share of the gap that a closure term removes on held-out steps if a map is corrected for it. Bound: the rest then has at most
+    /// 45 % of the amplitude, which is added to the uncertainty of the correction.
+    pub const NEEDED_GAP_REDUCTION: f64 = 0.8;
     /// Minimum probability of the causes by which a map is corrected. Judgement: of the diagnoses with a higher probability, 94 % are right on 2000 simulated
     /// campaigns (docs/validation/gap.md).
     pub const NEEDED_PROBABILITY: f64 = 0.9;
@@ -42,6 +37,13 @@ impl CorrectedMap {
 pub enum NotCorrected {
     /// The diagnosis names no cause.
     NoCause,
+    /// The causes change no reading from which the efficiency follows: they are properties of the machine itself.
+    OfTheMachine,
+    /// The closure term removes less of the gap on held-out steps than [`CorrectedMap::NEEDED_GAP_REDUCTION`].
+    NotClosed {
+        /// The share that it removes.
+        gap_reduction: f64,
+    },
     /// The open causes together are less probable than [`CorrectedMap::NEEDED_PROBABILITY`].
     Improbable {
         /// Probability of all causes together.
@@ -113,21 +115,30 @@ impl Diagnosed {
         // As in the diagnosis, the drift of a sensor is subtracted first.
         let undrifted = self.drift.as_ref().and_then(|drift| without_drift(recording, drift));
         let undrifted = undrifted.unwrap_or_else(|| recording.clone());
-        let without = |hypothesis: &Hypothesis| -> Result<T, E> {
-            let changes = Changes::of(&self.study, hypothesis).map_err(GapError::from)?;
-            identify(changes.subtracted_from(undrifted.clone()))
+        let changes = |hypothesis: &Hypothesis| -> Result<Changes, E> {
+            Ok(Changes::of(&self.study, hypothesis).map_err(GapError::from)?)
         };
-        let (open, probability) = self.open_causes();
-        let causes: Vec<Candidate> = open.iter().map(|(candidate, _)| (*candidate).clone()).collect();
-        let after = open.iter().map(|(_, fit)| without(&fit.hypothesis)).collect::<Result<Vec<T>, E>>()?;
+        let without =
+            |hypothesis: &Hypothesis| identify(changes(hypothesis)?.subtracted_from(undrifted.clone()));
+        let OpenCauses { causes, fits, probability, gap_reduction } = self.open_causes();
+        let is_of_machine = match fits.first() {
+            Some(fit) => changes(&fit.hypothesis)?.are_none(),
+            None => false,
+        };
+        let fits = if is_of_machine { Vec::new() } else { fits };
+        let after = fits.iter().map(|fit| without(&fit.hypothesis)).collect::<Result<Vec<T>, E>>()?;
         let points_after: Vec<Vec<IdentifiedPoint>> = after.iter().map(points).collect();
         let before_points = points(&before);
-        let (refused, moved) = match open.first() {
+        let (refused, moved) = match fits.first() {
+            None if is_of_machine => (Some(NotCorrected::OfTheMachine), None),
             None => (Some(NotCorrected::NoCause), None),
             Some(_) if probability < CorrectedMap::NEEDED_PROBABILITY => {
                 (Some(NotCorrected::Improbable { probability }), None)
             }
-            Some((_, fit)) => match one_sigma_away(&self.study, fit) {
+            Some(_) if gap_reduction < CorrectedMap::NEEDED_GAP_REDUCTION => {
+                (Some(NotCorrected::NotClosed { gap_reduction }), None)
+            }
+            Some(fit) => match one_sigma_away(&self.study, fit) {
                 None => (Some(NotCorrected::Undetermined), None),
                 moved => (ambiguous(&points_after[0], &points_after[1..]), moved),
             },
@@ -135,10 +146,13 @@ impl Diagnosed {
         // Nothing is refused only if there is a cause.
         let corrected = if refused.is_none() { after.into_iter().next() } else { None };
         let Some(identified) = corrected else {
-            let added: Vec<AddedUncertainty> = before_points
-                .iter()
-                .map(|point| self.by_open_causes(point, &causes, &points_after))
-                .collect();
+            let probabilities = causes.iter().map(|cause| cause.probability);
+            let mut open: Vec<(f64, Vec<IdentifiedPoint>)> = probabilities.zip(points_after).collect();
+            if let Some((weight, fit)) = self.imitation() {
+                open.push((weight, points(&without(&fit.hypothesis)?)));
+            }
+            let added: Vec<AddedUncertainty> =
+                before_points.iter().map(|point| self.by_open_causes(point, &open)).collect();
             let rows = before_points.iter().zip(&added);
             let rows = rows.map(|(point, added)| correction_of(Some(point), None, added.eta_sigma)).collect();
             return Ok(Correction {
@@ -150,8 +164,15 @@ impl Diagnosed {
         let moved = moved.unwrap_or_default().iter().map(without).collect::<Result<Vec<T>, E>>()?;
         let moved: Vec<Vec<IdentifiedPoint>> = moved.iter().map(points).collect();
         let corrected_points = points(&identified);
-        let added: Vec<AddedUncertainty> =
-            corrected_points.iter().map(|point| by_correction(point, &moved, &points_after[1..])).collect();
+        // The misfit is a square; what is left of its root may act on the points as the cause does.
+        let left_ratio = (1.0 - gap_reduction).max(0.0).sqrt();
+        let added: Vec<AddedUncertainty> = corrected_points
+            .iter()
+            .map(|point| {
+                let left = same_step(&before_points, point.step).map(|before| (before, left_ratio));
+                by_correction(point, &moved, &points_after[1..], left)
+            })
+            .collect();
         let rows = corrected_points.into_iter().zip(&added).map(|(mut point, added)| {
             added.widen(&mut point);
             correction_of(same_step(&before_points, point.step), Some(&point), added.eta_sigma)
@@ -160,21 +181,28 @@ impl Diagnosed {
         Ok(Correction { identified, map, added })
     }
 
-    /// What causes that are not corrected add to a point: what a correction for each of them would change, squared and weighted with its
-    /// probability, and the residual of T2 if no closure term describes a cause outside the library.
+    /// A closure term that removes most of the gap although its form is not the true one: it shows how far an outside cause may move the points.
+    /// With the probability of such a cause times what the term removes.
+    fn imitation(&self) -> Option<(f64, &CauseFit)> {
+        let Diagnosed { diagnosis, fits, .. } = self;
+        let term = diagnosis.closure_terms.first().filter(|_| diagnosis.is_outside_without_closure())?;
+        Some((diagnosis.probability_outside * term.gap_reduction, &fits.closures.first()?.fit))
+    }
+
+    /// What causes that are not corrected add to a point: what a correction for each of them (weight, points) would change, squared and
+    /// weighted, and the residual of T2 if no closure term describes a cause outside the library.
     fn by_open_causes(
         &self,
         point: &IdentifiedPoint,
-        causes: &[Candidate],
-        after: &[Vec<IdentifiedPoint>],
+        open: &[(f64, Vec<IdentifiedPoint>)],
     ) -> AddedUncertainty {
         let place = self.study.steps.iter().position(|step| step.marker.index == point.step);
         let residual = place
             .and_then(|place| Some(self.diagnosis.gap.points.get(place)?.eta_residual))
             .filter(|_| self.diagnosis.is_outside_without_closure());
         let sigma = |read: fn(&IdentifiedPoint) -> Option<f64>| {
-            let changes = causes.iter().zip(after).filter_map(|(cause, other)| {
-                Some(cause.probability * (read(same_step(other, point.step)?)? - read(point)?).powi(2))
+            let changes = open.iter().filter_map(|(weight, other)| {
+                Some(weight * (read(same_step(other, point.step)?)? - read(point)?).powi(2))
             });
             changes.sum::<f64>().sqrt()
         };
@@ -184,29 +212,44 @@ impl Diagnosed {
         }
     }
 
-    /// The open causes with their fits, and their total probability: the most probable ones that together reach [`CorrectedMap::NEEDED_PROBABILITY`]. None if the
-    /// diagnosis names no cause of the library.
-    fn open_causes(&self) -> (Vec<(&Candidate, &Fit)>, f64) {
-        let mut causes: Vec<(&Candidate, &Fit)> = Vec::new();
-        let mut probability = 0.0;
-        if !matches!(self.diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
-            return (causes, probability);
+    /// The closure term that is more probable than not, with those that the recording does not distinguish from it; else the most probable
+    /// causes of the library that together reach [`CorrectedMap::NEEDED_PROBABILITY`], none if the diagnosis names none.
+    fn open_causes(&self) -> OpenCauses<'_> {
+        let Diagnosed { diagnosis, fits, .. } = self;
+        if let Some(term) = diagnosis.probable_closure_term().filter(|_| !fits.closures.is_empty()) {
+            let sentences = std::iter::once(&term.sentence).chain(&term.equivalent);
+            return OpenCauses {
+                causes: sentences.map(|sentence| Candidate::of_closure(term, sentence)).collect(),
+                fits: fits.closures.iter().map(|closure| &closure.fit).collect(),
+                probability: term.probability,
+                gap_reduction: term.gap_reduction,
+            };
         }
-        for candidate in &self.diagnosis.candidates {
-            if probability >= CorrectedMap::NEEDED_PROBABILITY {
+        let mut open = OpenCauses { gap_reduction: 1.0, ..OpenCauses::default() };
+        if !diagnosis.verdict.names_a_cause() {
+            return open;
+        }
+        for (candidate, fit) in diagnosis.candidates.iter().zip(&fits.causes) {
+            if open.probability >= CorrectedMap::NEEDED_PROBABILITY {
                 break;
             }
-            let is_of_candidate = |fit: &&Fit| {
-                let mut ids = infos(&self.study.effects, &fit.hypothesis).map(|info| &info.id);
-                fit.hypothesis.effects.len() == candidate.effects.len()
-                    && ids.all(|id| candidate.effects.iter().any(|effect| effect == id))
-            };
-            let Some(fit) = self.fits.iter().find(is_of_candidate) else { break };
-            probability += candidate.probability;
-            causes.push((candidate, fit));
+            open.probability += candidate.probability;
+            open.causes.push(candidate.clone());
+            open.fits.push(fit);
         }
-        (causes, probability)
+        open
     }
+}
+
+/// The causes that a map may be corrected for, best first, with their fits.
+#[derive(Default)]
+struct OpenCauses<'a> {
+    causes: Vec<Candidate>,
+    fits: Vec<&'a CauseFit>,
+    /// Of all together.
+    probability: f64,
+    /// Share of the gap that a closure term removes on held-out steps; 1 for causes of the library, whose rest is noise.
+    gap_reduction: f64,
 }
 
 fn same_step(points: &[IdentifiedPoint], step: usize) -> Option<&IdentifiedPoint> {
@@ -214,18 +257,20 @@ fn same_step(points: &[IdentifiedPoint], step: usize) -> Option<&IdentifiedPoint
 }
 
 /// Uncertainty of the correction of a point: `moved` are the results one standard deviation away in each direction, `others` those of causes that
-/// the recording does not distinguish.
+/// the recording does not distinguish, `left` the point as recorded with the share of its change that may be left.
 fn by_correction(
     point: &IdentifiedPoint,
     moved: &[Vec<IdentifiedPoint>],
     others: &[Vec<IdentifiedPoint>],
+    left: Option<(&IdentifiedPoint, f64)>,
 ) -> AddedUncertainty {
     let sigma = |read: fn(&IdentifiedPoint) -> Option<f64>| {
         let here = read(point)?;
         let square =
             |other: &Vec<IdentifiedPoint>| Some((read(same_step(other, point.step)?)? - here).powi(2));
         let by_size: f64 = moved.iter().filter_map(square).sum();
-        Some((by_size + others.iter().filter_map(square).fold(0.0, f64::max)).sqrt())
+        let by_rest = left.and_then(|(before, ratio)| Some((ratio * (read(before)? - here)).powi(2)));
+        Some((by_size + by_rest.unwrap_or(0.0) + others.iter().filter_map(square).fold(0.0, f64::max)).sqrt())
     };
     AddedUncertainty {
         eta_sigma: sigma(|point| point.eta).unwrap_or(0.0),
@@ -308,93 +353,4 @@ fn correction_of(
         after: after.and_then(eta),
         correction_sigma,
     }
-}
-
-/// Effect of causes on the readings of a recording.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Changes {
-    /// Start of the first step, s. Earlier readings, from which a zero may have been taken, stay unchanged.
-    start_s: f64,
-    /// Change of each channel along the recording, in its unit.
-    channels: BTreeMap<Channel, Series>,
-}
-
-impl Changes {
-    /// The changes of a study's readings by the effects of a hypothesis.
-    pub(crate) fn of(study: &Study, hypothesis: &Hypothesis) -> Result<Changes, PredictError> {
-        let (start_s, end_s) = study.followed_s();
-        let times_s = study.table.t_s[study.table.range(start_s, end_s)].to_vec();
-        let with = |step: usize| study.rig(hypothesis, step);
-        // An error of an input sensor does not act on the machine: the true inputs are equal in both runs.
-        let bare = Hypothesis { effects: Vec::new(), ..hypothesis.clone() };
-        let without = |step: usize| -> Result<(Rig, Circumstances), EffectError> {
-            let (rig, circumstances) = study.rig(&bare, step)?;
-            let Circumstances { perturbations, paths, .. } = with(step)?.1;
-            Ok((rig, Circumstances { perturbations, paths, ..circumstances }))
-        };
-        let mut changes = vec![vec![0.0; times_s.len()]; OUTPUTS.len()];
-        study.read(hypothesis, with, &times_s, |index, output, reading, _| {
-            changes[output][index] += reading;
-        })?;
-        study.read(hypothesis, without, &times_s, |index, output, reading, _| {
-            changes[output][index] -= reading;
-        })?;
-        let series = |values: Vec<f64>| Series { t_s: times_s.clone(), values };
-        // P3 is also an input, of which only the error of its sensor counts.
-        let outputs = OUTPUTS.iter().zip(changes).filter(|(channel, _)| !INPUT_CHANNELS.contains(channel));
-        let mut channels: BTreeMap<Channel, Series> =
-            outputs.map(|(channel, values)| (*channel, series(values))).collect();
-        let mut of_inputs = INPUT_CHANNELS.map(|_| Vec::with_capacity(times_s.len()));
-        for t_s in &times_s {
-            let step = study.steps.iter().rposition(|step| step.marker.start_s <= *t_s).unwrap_or(0);
-            let inputs = |hypothesis: &Hypothesis| -> Result<BoundaryConditions, EffectError> {
-                Ok(study.true_inputs(&study.rig(hypothesis, step)?.1).at(*t_s))
-            };
-            let (mut with, mut without) = (inputs(hypothesis)?, inputs(&bare)?);
-            for (channel, values) in INPUT_CHANNELS.into_iter().zip(&mut of_inputs) {
-                let value = |boundary: &mut BoundaryConditions| {
-                    boundary_condition(boundary, channel).map_or(0.0, |value| *value)
-                };
-                values.push(value(&mut without) - value(&mut with));
-            }
-        }
-        channels.extend(
-            INPUT_CHANNELS.into_iter().zip(of_inputs).map(|(channel, values)| (channel, series(values))),
-        );
-        channels.retain(|_, change| change.values.iter().any(|value| *value != 0.0));
-        let start_s = study.steps.first().map_or(start_s, |first| first.marker.start_s);
-        Ok(Changes { start_s, channels })
-    }
-
-    /// The recording without these changes. At the start of the first step and the end of the last, which the model does not follow, the nearest change is
-    /// used.
-    pub(crate) fn subtracted_from(&self, mut recording: Recording) -> Recording {
-        for (channel, change) in &self.channels {
-            let own = recording.series.get_mut(channel).into_iter();
-            let elements = recording.elements.iter_mut().filter(|(element, _)| element.channel == *channel);
-            for series in own.chain(elements.map(|(_, series)| series)) {
-                for index in series.range(self.start_s, f64::INFINITY) {
-                    series.values[index] -= change.interpolate(series.t_s[index]).unwrap_or(0.0);
-                }
-            }
-        }
-        recording
-    }
-}
-
-/// The hypotheses one standard deviation away, in each independent direction of the uncertainty of a fit's effects; `None` if the recording does not
-/// determine the effects.
-pub(crate) fn one_sigma_away(study: &Study, fit: &Fit) -> Option<Vec<Hypothesis>> {
-    let coordinates = coordinates(&study.effects, &fit.hypothesis);
-    let mode = unknowns(&fit.hypothesis, &coordinates);
-    let nuisances = fit.hypothesis.nuisances.len();
-    let root = fit.covariance.clone().cholesky()?.l();
-    let moved = root.column_iter().map(|direction| {
-        let mut moved = mode.clone();
-        for (index, by) in direction.iter().enumerate() {
-            moved[nuisances + index] += by;
-        }
-        hypothesis_at(&fit.hypothesis, &coordinates, &moved)
-    });
-    Some(moved.collect())
 }

@@ -3,14 +3,18 @@
 use crate::closure::discover::{Discovered, discover};
 use crate::drift::DriftReport;
 use crate::gap::baseline::Baseline;
-use crate::gap::best_fit::fit::{Adequacy, Fit};
+use crate::gap::best_fit::fit::Fit;
+use crate::gap::best_fit::fitted_causes::{CauseFit, ClosureFit, Fits, map_effect};
+use crate::gap::calibrated_model::Found;
 use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::{Posterior, rivals, smallest_seen, suspicions, weight};
 use crate::gap::experiment::{Experiment, GapWarning};
 use crate::gap::gap_reduction::{Compared, beyond_prior, held_out_gap};
 use crate::gap::library_fits::LibraryFits;
 use crate::gap::next_experiment::{Suggested, next, sensor_near};
-use crate::gap::preconditions::{GapError, Prepared, another_machine, assumed, checked_study, is_of_sensors};
+use crate::gap::preconditions::{
+    GapError, Prepared, Problem, Zeroed, another_machine, assumed, checked_study, is_of_sensors,
+};
 use crate::gap::report::{Diagnosis, Gap, Next, Place, Verdict};
 use crate::gap::request::{BaselineRecording, ClosureSearch, GapRequest, RigRecording};
 use crate::gap::residuals::study::{Hypothesis, Prediction, Study, members};
@@ -22,7 +26,7 @@ use mapper_physics::rig::effect::{Effect, Submodel};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// A diagnosis with its fits, for figures and calibration.
+/// A diagnosis with its fits: new, or restored from a file.
 #[derive(Debug)]
 pub struct Diagnosed {
     /// The diagnosis.
@@ -31,21 +35,56 @@ pub struct Diagnosed {
     pub drift: Option<DriftReport>,
     /// Result of the isothermal zero.
     pub zero: ZeroOutcome,
-    /// The prepared recording.
+    /// The machine as found; `None` if its covariance cannot be formed.
+    pub found: Option<Found>,
+    /// The prepared recording, with the closure terms of the fits.
     pub study: Study,
-    /// Fit of the tolerances alone, on all steps.
-    pub null: Fit,
-    /// Prediction and whitened residual of the nominal model with the tolerances of the best fit, but without its cause. In
-    /// [`Diagnosed::null`] the tolerances imitate the cause. Equal to the null if no cause is named.
+    pub(crate) fits: Fits,
+    /// Everything that was fitted, for calibration; `None` if restored.
+    pub(crate) library: Option<LibraryFits>,
+}
+
+/// Predictions of a diagnosis and their whitened residuals, for figures.
+#[derive(Debug)]
+pub struct Evidence {
+    /// With the tolerances of the cause, but without the cause: fitted alone, tolerances imitate it.
     pub without_cause: (Prediction, Vec<f64>),
-    /// Best fits on all steps, best first.
-    pub fits: Vec<Fit>,
-    /// The best fit, or the fit of a closure term that explains the gap, with its name for people; `None` without a fit.
-    pub with_cause: Option<(&'static str, Fit)>,
-    /// Tests of the residual of the best fit.
-    pub adequacy: Adequacy,
-    /// Whitening and derivatives.
-    pub linearised: Linearised,
+    /// With the cause, and its name for people; `None` if the recording has no gap.
+    pub with_cause: Option<(&'static str, Prediction, Vec<f64>)>,
+}
+
+impl Diagnosed {
+    /// Runs the model with and without the cause: the closure term if it is more probable than not, else the most probable effects.
+    ///
+    /// # Errors
+    /// [`GapError`] if the model cannot follow the recording.
+    pub fn evidence(&self) -> Result<Evidence, GapError> {
+        let Diagnosed { diagnosis, study, fits, .. } = self;
+        let new = self.library.is_none().then(|| Linearised::new(study)).transpose()?;
+        let Some(linearised) = self.library.as_ref().map(|library| &library.linearised).or(new.as_ref())
+        else {
+            return Err(Problem::Empty.into());
+        };
+        let read = |hypothesis: &Hypothesis| -> Result<(Prediction, Vec<f64>), GapError> {
+            let prediction = study.predict(hypothesis)?;
+            let residual = linearised.residual(study, &prediction);
+            Ok((prediction, residual))
+        };
+        let settled = diagnosis.probable_closure_term().and(fits.closures.first());
+        let closure = settled.map(|closure| ("the closure term", &closure.fit));
+        let first = fits.causes.first().map(|cause| ("the most probable cause", cause));
+        let with = closure.or(first).filter(|_| diagnosis.verdict != Verdict::WithinTolerance);
+        let named = with.filter(|_| closure.is_some() || diagnosis.verdict != Verdict::Unexplained);
+        let tolerances = named.map_or(&fits.null, |(_, fit)| fit).hypothesis.nuisances.clone();
+        Ok(Evidence {
+            without_cause: read(&Hypothesis { nuisances: tolerances, effects: Vec::new() })?,
+            with_cause: with
+                .map(|(name, fit)| {
+                    read(&fit.hypothesis).map(|(prediction, residual)| (name, prediction, residual))
+                })
+                .transpose()?,
+        })
+    }
 }
 
 /// Share of the time taken by the drift search. Bound: only shown.
@@ -80,13 +119,14 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     // A change with time cannot be expressed as a closure term.
     let closure = if prepared.drift.is_some() { closure.without_terms() } else { closure };
     let is_outside_tolerance = verdict != Verdict::WithinTolerance;
+    let has_closure = closure.is_settled();
     let locations = match closure.places {
         _ if !is_outside_tolerance => Vec::new(),
         Some(places) => places,
         None => library.locations(&calibration, &posterior),
     };
     beyond(CLOSURE_END, "next experiment");
-    let open = OpenQuestion { verdict, locations: &locations, has_closure: closure.settled.is_some() };
+    let open = OpenQuestion { verdict, locations: &locations, has_closure };
     let Suggested { next, experiments } =
         next_experiment(&library, &posterior, open, &experiments, &calibration);
     let smallest_seen = match verdict {
@@ -103,6 +143,8 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         closure_terms: closure.closure_terms,
         closure_terms_by_balance: if is_outside_tolerance { closure.residual_sources } else { Vec::new() },
         gap,
+        map_effect: None,
+        lists_all: false,
         next,
         experiments,
         smallest_seen,
@@ -114,23 +156,26 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         probability_unlisted: posterior.probabilities.unlisted,
         probability_outside: posterior.probabilities.unmodelled,
     };
-    let bare = closure.settled.as_ref().or(named).and_then(|fit| without_effects(&library, fit));
-    let with_closure = closure.settled.map(|fit| ("the closure term", fit));
+    let best = library.fits.first().filter(|_| verdict.names_a_cause()).unwrap_or(&library.null);
+    let found = Found::of(&library.study, best, diagnosis.doubt());
+    let mut study = library.study.clone();
+    let closures = closure.fits.into_iter().filter_map(|(key, effect, fit)| {
+        let mut fit = CauseFit::of(&fit);
+        let own = fit.hypothesis.effects.iter_mut().find(|(index, _)| *index == effect)?;
+        own.0 = key.add_to(&mut study)?;
+        Some(ClosureFit { key, fit })
+    });
+    let causes = posterior.probabilities.causes.iter().map(|cause| CauseFit::of(&library.fits[cause.set]));
+    let fits =
+        Fits { null: CauseFit::of(&library.null), causes: causes.collect(), closures: closures.collect() };
+    let settled = diagnosis.probable_closure_term().and(fits.closures.first());
+    let cause =
+        settled.map(|closure| &closure.fit).or(fits.causes.first().filter(|_| verdict.names_a_cause()));
+    let Zeroed { recording, zero, .. } = prepared.zeroed;
+    let map_effect = cause.and_then(|cause| map_effect(&study, cause, &recording, &rig.identification));
+    let diagnosis = Diagnosis { map_effect, ..diagnosis };
     progress(1.0, "done");
-    Ok(Diagnosed {
-        diagnosis,
-        drift: prepared.drift,
-        zero: prepared.zeroed.zero,
-        without_cause: bare
-            .unwrap_or_else(|| (library.null.prediction.clone(), library.null.residual.clone())),
-        with_cause: with_closure
-            .or_else(|| library.fits.first().map(|best| ("the most probable cause", best.clone()))),
-        study: library.study,
-        null: library.null,
-        fits: library.fits,
-        adequacy: library.adequacy,
-        linearised: library.linearised,
-    })
+    Ok(Diagnosed { diagnosis, drift: prepared.drift, zero, found, study, fits, library: Some(library) })
 }
 
 /// The nominal model driven by a recording, or by its changes since a baseline.
@@ -265,12 +310,4 @@ fn inseparable(library: &LibraryFits, posterior: &Posterior) -> Vec<String> {
     let in_all = |part: &Submodel| parts.iter().all(|of_fit| of_fit.contains(part));
     let some: BTreeSet<Submodel> = parts.iter().flatten().copied().filter(|part| !in_all(part)).collect();
     some.into_iter().map(|part| part.name().to_owned()).collect()
-}
-
-/// Prediction and whitened residual of a fit without its effects.
-fn without_effects(library: &LibraryFits, fit: &Fit) -> Option<(Prediction, Vec<f64>)> {
-    let bare = Hypothesis { nuisances: fit.hypothesis.nuisances.clone(), effects: Vec::new() };
-    let prediction = library.study.predict(&bare).ok()?;
-    let residual = library.linearised.residual(&library.study, &prediction);
-    Some((prediction, residual))
 }

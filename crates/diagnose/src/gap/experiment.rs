@@ -2,7 +2,7 @@
 
 use mapper_core::unit_factors::S_PER_MIN;
 use mapper_core::{Channel, OperatingPoint, Series, coded_enum};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// An allowed jump.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -135,7 +135,7 @@ GapWarning {
 }
 
 /// Offset of a sensor at rest beyond its declaration, in the unit of the channel; subtracted before the diagnosis.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OffsetAtRest {
     /// The channel.
     pub channel: Channel,

@@ -15,6 +15,7 @@ use crate::gap::residuals::study::{Study, members};
 use crate::gap::residuals::whiten::Linearised;
 
 /// A recording and the fits of the library to it.
+#[derive(Debug)]
 pub(crate) struct LibraryFits {
     pub(crate) study: Study,
     /// Linearised at the nominal model.

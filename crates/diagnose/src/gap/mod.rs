@@ -16,6 +16,7 @@ pub(crate) mod report;
 pub(crate) mod request;
 pub(crate) mod residuals;
 pub(crate) mod scores;
+pub(crate) mod stored;
 pub(crate) mod structure;
 pub(crate) mod verdict;
 
@@ -26,12 +27,13 @@ pub use calibrated_model::{
 };
 pub use causes::additions::{Calibration, Origin};
 pub use consequence::{CorrectedMap, Correction, NotCorrected, PointCorrection};
-pub use diagnose::Diagnosed;
+pub use diagnose::{Diagnosed, Evidence};
 pub use experiment::{AllowedJump, AlsoChanged, AtRest, Experiment, GapWarning, OffsetAtRest};
 pub use report::{
-    BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosis, Estimate, Gap, Kind, Next, PointGap,
-    SmallestSeen, Suggestion, Verdict,
+    BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosis, Estimate, Gap, Kind, MapEffect, Next,
+    PointGap, SmallestSeen, Suggestion, Verdict,
 };
 pub use request::{BaselineRecording, ClosureSearch, GapRequest, RigRecording};
 pub use residuals::study::Study;
 pub use scores::{EffectVisibility, Scores};
+pub use stored::{RestoreError, StoredFits};

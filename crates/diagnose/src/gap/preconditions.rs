@@ -350,7 +350,7 @@ fn found_drift(rig: &RigRecording) -> Option<DriftReport> {
 
 impl Zeroed {
     /// Subtracts the drift of sensors and the zero, which reduces the offset uncertainty.
-    fn new(rig: &RigRecording, drift: Option<&DriftReport>) -> Zeroed {
+    pub(crate) fn new(rig: &RigRecording, drift: Option<&DriftReport>) -> Zeroed {
         let config = &rig.identification;
         let undrifted = drift.and_then(|drift| without_drift(&rig.recording, drift));
         let recording = undrifted.unwrap_or_else(|| rig.recording.clone());

@@ -3,7 +3,7 @@
 use crate::gap::baseline::Baseline;
 use crate::gap::experiment::{AlsoChanged, Experiment, GapWarning, OffsetAtRest};
 use mapper_core::unit_factors::{CM2_PER_M2, G_PER_KG, MM_PER_M, PERCENT};
-use mapper_core::{probability_text, with_unit};
+use mapper_core::{nan_where_null, probability_text, with_unit};
 use mapper_physics::laws::turbine::at_150_krpm;
 use mapper_physics::rig::effect::EffectParameter;
 use serde::{Deserialize, Serialize};
@@ -23,13 +23,20 @@ pub enum Verdict {
     Unexplained,
 }
 
+impl Verdict {
+    /// Whether a cause of the library is named.
+    pub fn names_a_cause(self) -> bool {
+        matches!(self, Verdict::Explained | Verdict::PartlyExplained)
+    }
+}
+
 /// A diagnosis.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Overall verdict.
     pub verdict: Verdict,
     /// Set if a baseline was given: the diagnosis then covers only changes since that recording.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baseline: Option<Baseline>,
     /// Locations of the gap, largest first.
     pub locations: Vec<Place>,
@@ -51,6 +58,8 @@ pub struct Diagnosis {
     pub closure_terms_by_balance: Vec<BalanceClosure>,
     /// The gap before and after the best cause.
     pub gap: Gap,
+    /// What the cause, or the closure term that is more probable than not, does to the map; `None` without one.
+    pub map_effect: Option<MapEffect>,
     /// Suggested next step; `None` if the diagnosis is settled.
     pub next: Option<Next>,
     /// Experiments that distinguish the open causes, best per minute first; `next` is the first of them.
@@ -61,13 +70,16 @@ pub struct Diagnosis {
     pub assumed: Vec<String>,
     /// Sensor offsets beyond tolerance, found at rest and already subtracted.
     pub offsets_at_rest: Vec<OffsetAtRest>,
+    /// Whether improbable causes are listed, too.
+    #[serde(skip)]
+    pub lists_all: bool,
     /// Limits of the diagnosis.
     #[serde(serialize_with = "mapper_core::json_messages::serialize")]
     pub warnings: Vec<GapWarning>,
 }
 
 /// A location of the gap.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Place {
     /// Part of the model.
     pub submodel: String,
@@ -88,7 +100,7 @@ pub struct Place {
 }
 
 /// A parameter with its 95 % interval.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Best value.
     pub value: f64,
@@ -105,10 +117,10 @@ pub struct Estimate {
 }
 
 /// Onset of a cause.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Onset {
     /// Index of the step, from 0; files use its number, from 1.
-    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
+    #[serde(with = "mapper_core::test_plan::step_number")]
     pub step: usize,
     /// Start of the step, s of the recording.
     pub t_s: f64,
@@ -117,7 +129,7 @@ pub struct Onset {
 }
 
 /// Smallest detectable size of an effect.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SmallestSeen {
     /// Id of the effect.
     pub effect: String,
@@ -134,7 +146,7 @@ pub struct SmallestSeen {
 }
 
 /// A term that closes a balance outside the effect library.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ClosureTerm {
     /// Part of the model where it acts.
     pub submodel: String,
@@ -154,6 +166,8 @@ pub struct ClosureTerm {
     pub worse: Vec<String>,
     /// Library effects fitted together with the term; empty if it was found alone.
     pub beside: Vec<String>,
+    /// These effects with their sizes.
+    pub beside_cause: Option<Candidate>,
     /// Share of the leave-one-out folds of steps that select the same part and this term or an equivalent.
     pub stability: f64,
     /// Closure terms that the recording cannot distinguish from this one, as sentences.
@@ -161,12 +175,12 @@ pub struct ClosureTerm {
     /// Name of the effect file written for it.
     pub rhai: Option<String>,
     /// Content of that file; `None` if a script cannot express the term.
-    #[serde(skip)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub script: Option<String>,
 }
 
 /// One number of a closure term with its 95 % interval.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ClosureCoefficient {
     /// Name.
     pub term: String,
@@ -181,7 +195,7 @@ pub struct ClosureCoefficient {
 }
 
 /// The closure term that one balance would need, assuming that it is the only one.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BalanceClosure {
     /// Part of the model.
     pub submodel: String,
@@ -196,7 +210,7 @@ pub struct BalanceClosure {
 }
 
 /// A cause: one or more effects.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Candidate {
     /// Ids of its effects.
     pub effects: Vec<String>,
@@ -212,8 +226,21 @@ pub struct Candidate {
     pub equivalent: Vec<Vec<String>>,
 }
 
+impl Candidate {
+    /// Id of a closure term among the effects of a cause.
+    pub const CLOSURE: &str = "closure_term";
+
+    /// A closure term as a cause, with the effects fitted beside it.
+    pub(crate) fn of_closure(term: &ClosureTerm, sentence: &str) -> Candidate {
+        let mut cause = term.beside_cause.clone().unwrap_or_default();
+        cause.effects.push(Candidate::CLOSURE.to_owned());
+        cause.names.push(sentence.to_owned());
+        Candidate { probability: term.probability, ..cause }
+    }
+}
+
 /// Root mean square residual of a channel over the steps, each predicted by a fit to other steps.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChannelGap {
     /// Nominal model, nothing fitted.
     pub nominal: f64,
@@ -226,31 +253,54 @@ pub struct ChannelGap {
 }
 
 /// Efficiency and heat transfer at the end of a step for three models, at the same speed, pressures and metal temperatures.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PointGap {
     /// Shaft speed, rpm.
     pub speed_rpm: f64,
     /// Valve opening.
     pub valve: f64,
     /// Efficiency of the nominal model.
+    #[serde(deserialize_with = "nan_where_null")]
     pub eta_nominal: f64,
     /// Efficiency with the tolerances of the best cause's fit, but without the cause.
+    #[serde(deserialize_with = "nan_where_null")]
     pub eta_before: f64,
     /// Efficiency with the best cause.
+    #[serde(deserialize_with = "nan_where_null")]
     pub eta_after: f64,
     /// Residual of T2 minus T1 at the end of the step, from a fit to other steps, as an error of the efficiency: what a cause outside the
     /// library may do to it.
+    #[serde(deserialize_with = "nan_where_null")]
     pub eta_residual: f64,
     /// Heat-transfer coefficient of the nominal model, W/(m2 K).
+    #[serde(deserialize_with = "nan_where_null")]
     pub h_nominal_w_m2k: f64,
     /// Heat-transfer coefficient with the tolerances of the best cause's fit, but without the cause, W/(m2 K).
+    #[serde(deserialize_with = "nan_where_null")]
     pub h_before_w_m2k: f64,
     /// Heat-transfer coefficient with the best cause, W/(m2 K).
+    #[serde(deserialize_with = "nan_where_null")]
     pub h_after_w_m2k: f64,
 }
 
+/// The largest error that a cause makes in an efficiency identified from one step by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MapEffect {
+    /// Index of the step, from 0; files use its number, from 1.
+    #[serde(with = "mapper_core::test_plan::step_number")]
+    pub step: usize,
+    /// Shaft speed, rpm.
+    pub speed_rpm: f64,
+    /// Valve opening.
+    pub valve: f64,
+    /// Efficiency as recorded minus that without the cause, fraction.
+    pub eta_error: f64,
+    /// Half of its 95 % interval, from the size of the cause.
+    pub half_interval: f64,
+}
+
 /// A tolerance or offset outside its prior.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BeyondPrior {
     /// Name.
     pub what: String,
@@ -261,7 +311,7 @@ pub struct BeyondPrior {
 }
 
 /// The gap, with each step predicted by a fit to other steps.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Gap {
     /// Mean of `(|r|^2 - n)/n` over the steps for the nominal model.
     pub nominal: f64,
@@ -278,7 +328,7 @@ pub struct Gap {
     /// Number of steps with a misfit beyond noise after the tolerance fit: the sample size of the interval.
     pub steps_with_gap: usize,
     /// Index of the step with the largest share of the gap, from 0; files use its number, from 1.
-    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
+    #[serde(with = "mapper_core::test_plan::step_number")]
     pub largest_step: Option<usize>,
     /// Its share of the gap.
     pub largest_share: f64,
@@ -287,10 +337,10 @@ pub struct Gap {
     /// Channels that the cause makes worse.
     pub worse: Vec<String>,
     /// Indices of the steps held out in one of the folds; empty if there are too few steps. Files use numbers, from 1.
-    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
+    #[serde(with = "mapper_core::test_plan::step_number")]
     pub held_out_steps: Vec<usize>,
     /// Folds: indices of the steps held out together, from 0; files use numbers, from 1.
-    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
+    #[serde(with = "mapper_core::test_plan::step_number")]
     pub folds: Vec<Vec<usize>>,
     /// Each channel.
     pub channels: BTreeMap<String, ChannelGap>,
@@ -299,7 +349,7 @@ pub struct Gap {
 }
 
 /// An operating point of a jump.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct JumpPoint {
     /// Shaft speed, rpm.
     pub speed_rpm: f64,
@@ -308,7 +358,7 @@ pub struct JumpPoint {
 }
 
 /// Suggested next step.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Next {
     /// The jump that best distinguishes the remaining candidates.
@@ -345,7 +395,7 @@ pub enum Next {
 }
 
 /// Kind of experiment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// Change of speed, at any opening.
@@ -381,7 +431,7 @@ impl Kind {
 }
 
 /// An experiment with its expected result.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Suggestion {
     /// Kind.
     pub kind: Kind,
@@ -440,18 +490,20 @@ impl Suggestion {
 
 /// Probability below which a cause other than the first is not listed. Bound: it would be shown as "<0.5 %".
 pub(crate) const EXCLUDED: f64 = 0.005;
+/// Probability below which a cause other than the first is listed only on request. Bound: one in twenty is what an interval excludes.
+const LISTED: f64 = 0.05;
 /// Maximum number of candidates that are evaluated with refits: fits of the search, and experiments. Bound: effort.
 pub(crate) const MAX_REFITTED: usize = 7;
 /// Maximum number of alternatives to the first cause, and of experiments of one kind. Bound: a longer list does not help.
 pub(crate) const MAX_EQUIVALENT: usize = 2;
 
 impl Diagnosis {
-    /// Causes to list: the first, and others that are not excluded.
+    /// Causes to list: the first, and others that are not improbable.
     pub fn listed(&self) -> impl Iterator<Item = &Candidate> {
         self.candidates
             .iter()
             .enumerate()
-            .filter(|(place, c)| *place == 0 || c.probability >= EXCLUDED)
+            .filter(|(place, c)| *place == 0 || self.lists_all || c.probability >= LISTED)
             .map(|(_, c)| c)
     }
 

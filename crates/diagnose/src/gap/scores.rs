@@ -5,6 +5,7 @@ use crate::gap::best_fit::fit::{Fit, lengths};
 use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::weight;
 use crate::gap::diagnose::Diagnosed;
+use crate::gap::library_fits::LibraryFits;
 use crate::gap::preconditions::{GapError, Problem};
 use crate::gap::request::RigRecording;
 use crate::gap::residuals::study::{EffectValues, Study, members};
@@ -28,20 +29,20 @@ pub struct Scores {
 }
 
 impl Diagnosed {
-    /// The scores of a recording whose causes are known: ids and values.
-    pub fn scores(&self, calibration: &Calibration, truth: &[(String, Vec<f64>)]) -> Scores {
-        let Diagnosed { study, null, fits, adequacy, .. } = self;
+    /// The scores of a recording whose causes are known: ids and values. `None` for a diagnosis from a file.
+    pub fn scores(&self, calibration: &Calibration, truth: &[(String, Vec<f64>)]) -> Option<Scores> {
+        let LibraryFits { study, null, fits, adequacy, .. } = self.library.as_ref()?;
         let names = |fit: &Fit| -> BTreeSet<String> {
             members(&fit.hypothesis).into_iter().map(|i| study.effects[i].info().id.to_string()).collect()
         };
         let causes: BTreeSet<String> = truth.iter().map(|(id, _)| id.clone()).collect();
         let named = fits.first().filter(|fit| names(fit) == causes);
-        Scores {
+        Some(Scores {
             nothing: weight(calibration, study, null),
             candidates: fits.iter().map(|fit| (names(fit), weight(calibration, study, fit))).collect(),
             features: adequacy.features(),
             errors_sigma: named.map_or_else(Vec::new, |fit| errors_sigma(study, fit, truth)),
-        }
+        })
     }
 }
 

@@ -168,7 +168,38 @@ pub struct TooManyExtraStates {
     pub needed: usize,
 }
 
+/// The part of hooks that belongs to the machine's characteristics: flow, efficiency, torque and leaks.
+#[derive(Debug)]
+struct Characteristics(Arc<dyn Hooks>);
+
+impl Hooks for Characteristics {
+    fn flow_kg_s(&self, site: &Site<'_>, flow_kg_s: f64) -> f64 {
+        self.0.flow_kg_s(site, flow_kg_s)
+    }
+
+    fn efficiency(&self, site: &Site<'_>, efficiency: f64) -> f64 {
+        self.0.efficiency(site, efficiency)
+    }
+
+    fn flow_to_outlet_kg_s(&self, site: &Site<'_>) -> f64 {
+        self.0.flow_to_outlet_kg_s(site)
+    }
+
+    fn shaft_torque_nm(&self, site: &Site<'_>) -> f64 {
+        self.0.shaft_torque_nm(site)
+    }
+}
+
 impl HookList {
+    /// Only what belongs to the machine's characteristics, of hooks without hidden temperatures.
+    #[must_use]
+    pub fn characteristics(&self) -> HookList {
+        let own = self.placed.iter().filter(|one| one.extra_states == 0);
+        let own =
+            own.map(|one| PositionedHooks { hooks: Arc::new(Characteristics(one.hooks.clone())), ..*one });
+        HookList { placed: own.collect(), extra_states: 0 }
+    }
+
     /// Adds hooks after the existing ones, and passes them the values that those returned.
     pub fn push(&mut self, hooks: Arc<dyn Hooks>) -> Result<(), TooManyExtraStates> {
         let extra_states = hooks.extra_states();

@@ -23,6 +23,22 @@ pub struct Model {
     pub hooks: HookList,
 }
 
+impl Model {
+    /// Takes the machine's own characteristics from another one: flow and efficiency of the compressor, turbine, shaft and valve. What
+    /// acts on gas, housings and readings stays.
+    pub fn take_characteristics(&mut self, of: &Model) {
+        let (own, of_params) = (&mut self.params, of.params);
+        own.compressor.efficiency_scale_ratio = of_params.compressor.efficiency_scale_ratio;
+        own.compressor.flow_scale_ratio = of_params.compressor.flow_scale_ratio;
+        own.turbine = of_params.turbine;
+        own.outlet = of_params.outlet;
+        own.shaft_inertia_kgm2 = of_params.shaft_inertia_kgm2;
+        own.bearing_friction_w_s2 = of_params.bearing_friction_w_s2;
+        self.map = of.map.clone();
+        self.hooks = of.hooks.characteristics();
+    }
+}
+
 /// The model under constant boundary conditions; all terms that they determine are computed once.
 #[derive(Debug)]
 pub struct PreparedModel<'a> {

@@ -29,6 +29,9 @@ impl Describe for DriftReport {
         {
             document.text(format!("Not excluded: {others}."));
         }
+        document.text(self.unseen_before_s.map_or_else(String::new, |before_s| {
+            format!("A change before {before_s:.0} s would not be seen: it is in every repeated visit.")
+        }));
         let mut repeats = Document::default();
         if !self.groups.is_empty() {
             repeats.text(

@@ -5,7 +5,7 @@ use crate::formatting::{Message, display_scale};
 use mapper_chart::palette::{self, Colour};
 use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
 use mapper_core::{Channel, probability_text, step_number};
-use mapper_diagnose::gap::{Diagnosed, Diagnosis, GapWarning, Kind, Next, OffsetAtRest, Study, Suggestion};
+use mapper_diagnose::gap::{Diagnosis, Evidence, GapWarning, Kind, Next, OffsetAtRest, Study, Suggestion};
 use mapper_numerics::statistics::{mean, rms};
 
 /// 0 degC, K.
@@ -177,16 +177,16 @@ const CLASSES: [(f64, Colour, &str); 4] = [
 ];
 
 /// Ends of the steps on the compressor map, coloured by their residual, before and after.
-pub(crate) fn residual_maps(diagnosed: &Diagnosed) -> Vec<Figure> {
+pub(crate) fn residual_maps(study: &Study, evidence: &Evidence) -> Vec<Figure> {
     let mut pictures = Vec::new();
-    let after = diagnosed.with_cause.as_ref().map(|(cause, fit)| (format!("with {cause}"), &fit.residual));
+    let after = evidence.with_cause.as_ref().map(|(cause, _, residual)| (format!("with {cause}"), residual));
     for (title, residual) in
-        [("without the cause".to_owned(), &diagnosed.without_cause.1)].into_iter().chain(after)
+        [("without the cause".to_owned(), &evidence.without_cause.1)].into_iter().chain(after)
     {
         let mut classes: [Vec<(f64, f64)>; CLASSES.len()] = Default::default();
-        for step in 0..diagnosed.study.steps.len() {
-            let Some(place) = place_on_map(&diagnosed.study, step) else { continue };
-            let groups = diagnosed.study.groups.iter().filter(|group| group.step == step);
+        for step in 0..study.steps.len() {
+            let Some(place) = place_on_map(study, step) else { continue };
+            let groups = study.groups.iter().filter(|group| group.step == step);
             let rms = rms(groups.flat_map(|group| &residual[group.rows.clone()])).unwrap_or(0.0);
             let class = CLASSES.iter().position(|(up_to, ..)| rms <= *up_to).unwrap_or(CLASSES.len() - 1);
             classes[class].push(place);
@@ -216,12 +216,12 @@ fn place_on_map(study: &Study, step: usize) -> Option<(f64, f64)> {
 }
 
 /// Root mean square of the whitened residual of each step and channel, on a ground that shows its size.
-pub(crate) fn heat_table(diagnosed: &Diagnosed, caption: &str, residual: &[f64]) -> Table {
+pub(crate) fn heat_table(study: &Study, caption: &str, residual: &[f64]) -> Table {
     let heads = ["step".to_owned()].into_iter().chain(Study::OUTPUTS.iter().map(ToString::to_string));
     let mut table = Table::new(heads).caption(caption);
-    for step in 0..diagnosed.study.steps.len() {
+    for step in 0..study.steps.len() {
         let cell = |output: usize| {
-            let group = diagnosed.study.groups.iter().find(|g| g.step == step && g.output == output);
+            let group = study.groups.iter().find(|g| g.step == step && g.output == output);
             let Some(group) = group else { return "-".into() };
             let rms = rms(&residual[group.rows.clone()]).unwrap_or(0.0);
             // White at 1, red from 30 on, logarithmic.
@@ -234,11 +234,11 @@ pub(crate) fn heat_table(diagnosed: &Diagnosed, caption: &str, residual: &[f64])
 }
 
 /// Measured minus predicted over time, before and after, for the four channels with the largest gap.
-pub(crate) fn traces(diagnosed: &Diagnosed) -> Vec<Figure> {
-    let Some((cause, best)) = &diagnosed.with_cause else { return Vec::new() };
+pub(crate) fn traces(study: &Study, evidence: &Evidence) -> Vec<Figure> {
+    let Some((cause, best, _)) = &evidence.with_cause else { return Vec::new() };
     let energy = |output: usize| {
-        let groups = diagnosed.study.groups.iter().filter(|g| g.output == output);
-        groups.flat_map(|g| &diagnosed.without_cause.1[g.rows.clone()]).map(|r| r * r).sum::<f64>()
+        let groups = study.groups.iter().filter(|g| g.output == output);
+        groups.flat_map(|g| &evidence.without_cause.1[g.rows.clone()]).map(|r| r * r).sum::<f64>()
     };
     let mut order: Vec<usize> = (0..Study::OUTPUTS.len()).collect();
     order.sort_by(|a, b| energy(*b).total_cmp(&energy(*a)));
@@ -246,22 +246,22 @@ pub(crate) fn traces(diagnosed: &Diagnosed) -> Vec<Figure> {
         let channel = Study::OUTPUTS[output];
         let (scale, unit) = display_scale(channel.unit());
         let points = |values: &[f64]| {
-            let of_output = diagnosed.study.groups.iter().filter(|g| g.output == output);
+            let of_output = study.groups.iter().filter(|g| g.output == output);
             of_output
                 .flat_map(|g| {
                     g.rows.clone().zip(&g.blocks).map(|(row, block)| {
-                        let t_s = diagnosed.study.steps[g.step].blocks[*block].mean_s;
-                        (t_s / 60.0, scale * (diagnosed.study.measured[row] - values[row]))
+                        let t_s = study.steps[g.step].blocks[*block].mean_s;
+                        (t_s / 60.0, scale * (study.measured[row] - values[row]))
                     })
                 })
                 .collect::<Vec<(f64, f64)>>()
         };
         let panel = Panel::new(Axis::new("time, min"), Axis::new(format!("{channel}, {unit}")))
             .with(
-                Line::new(points(&diagnosed.without_cause.0.values), palette::VERMILLION)
+                Line::new(points(&evidence.without_cause.0.values), palette::VERMILLION)
                     .label("without the cause"),
             )
-            .with(Line::new(points(&best.prediction.values), palette::BLUE).label(format!("with {cause}")));
+            .with(Line::new(points(&best.values), palette::BLUE).label(format!("with {cause}")));
         Figure::new("").columns(1).panel_size_px(430.0, 180.0).panel(panel)
     };
     order.into_iter().take(4).map(picture).collect()

@@ -62,7 +62,7 @@ pub fn correction(map: &CorrectedMap, diagnosis: &Diagnosis) -> Document {
         let largest = map.points.iter().map(|point| point.correction_sigma).fold(0.0, f64::max);
         if largest > 0.0 {
             let source = if diagnosis.is_outside_without_closure() {
-                "No closure term describes the cause: it may touch every point, and the residual of T2 widens"
+                "No closure term is certain enough: the cause may touch every point, and the residual of T2 and the nearest term widen"
             } else {
                 "What a correction would change, weighted with its probability, widens"
             };
@@ -70,9 +70,6 @@ pub fn correction(map: &CorrectedMap, diagnosis: &Diagnosis) -> Document {
                 "{source} the intervals of all points, by a standard uncertainty of up to {:.2} points.",
                 100.0 * largest
             ));
-        }
-        if diagnosis.probable_closure_term().is_some() {
-            document.text("A closure term was found: write it with `mapper gap diagnose --closure-terms DIR`, and correct with `--effect`.");
         }
         document.section("Next experiment", next_section(diagnosis));
         return document;
@@ -109,6 +106,15 @@ fn refusal(refused: &NotCorrected) -> String {
     let needed = 100.0 * CorrectedMap::NEEDED_PROBABILITY;
     match refused {
         NotCorrected::NoCause => "the diagnosis names no cause of its library".to_owned(),
+        NotCorrected::OfTheMachine => {
+            "the cause belongs to the machine itself, and its efficiency as recorded is the true one"
+                .to_owned()
+        }
+        NotCorrected::NotClosed { gap_reduction } => format!(
+            "the closure term removes {:.0} % of the gap on held-out steps, and {:.0} % are needed",
+            100.0 * gap_reduction,
+            100.0 * CorrectedMap::NEEDED_GAP_REDUCTION
+        ),
         NotCorrected::Improbable { probability } => {
             format!(
                 "the open causes have {:.0} % together, and {needed:.0} % are needed",

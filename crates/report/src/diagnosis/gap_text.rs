@@ -6,8 +6,8 @@ use crate::document::{Cell, Describe, Document, Table};
 use crate::formatting::{Message, display_scale, four_figures};
 use mapper_core::{Channel, probability_text, step_number, with_unit};
 use mapper_diagnose::gap::{
-    Baseline, BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosed, Diagnosis, Estimate, Gap, PointGap,
-    SmallestSeen, Verdict,
+    Baseline, BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosed, Diagnosis, Estimate, Evidence, Gap,
+    MapEffect, PointGap, SmallestSeen, Verdict,
 };
 use std::collections::BTreeMap;
 
@@ -18,6 +18,10 @@ const CAUSES: usize = 8;
 const NOTHING: &str = "nothing beyond tolerance";
 /// Effects of the library that the list does not contain.
 const UNLISTED: &str = "other effects of the library";
+/// Causes that are listed only on request.
+const IMPROBABLE: &str = "others, each below 5 % (--all)";
+/// Probability from which they have a row: it is not rounded to zero.
+const SHOWN: f64 = 5e-3;
 /// The answer that the cause is not in the library.
 const OUTSIDE: &str = "a cause outside the effect library";
 
@@ -33,12 +37,12 @@ impl Describe for Diagnosis {
 }
 
 /// The findings with their evidence as figures.
-pub(crate) fn gap_document(diagnosed: &Diagnosed) -> Document {
+pub(crate) fn gap_document(diagnosed: &Diagnosed, figures: &Evidence) -> Document {
     let diagnosis = &diagnosed.diagnosis;
     let mut document = Document::default();
     document.strong(headline(diagnosis));
     document.append(findings(diagnosis));
-    document.section("Evidence", evidence(diagnosed));
+    document.section("Evidence", evidence(diagnosed, figures));
     document.append(recommendations(diagnosis));
     document
 }
@@ -91,7 +95,11 @@ fn causes(diagnosis: &Diagnosis) -> Document {
             candidate.equivalent.iter().map(|set| format!("; indistinguishable from {}", set.join(" + ")));
         (candidate.probability, cause(candidate) + others.collect::<String>().as_str())
     });
+    let listed: f64 = diagnosis.listed().map(|candidate| candidate.probability).sum();
+    let all: f64 = diagnosis.candidates.iter().map(|candidate| candidate.probability).sum();
+    let improbable = Some((all - listed, IMPROBABLE.to_owned())).filter(|(sum, _)| *sum > SHOWN);
     let mut rows: Vec<(f64, String)> = candidate_rows
+        .chain(improbable)
         .chain([
             (diagnosis.probability_none, NOTHING.to_owned()),
             (diagnosis.probability_unlisted, UNLISTED.to_owned()),
@@ -154,14 +162,12 @@ fn detection_limits(effects: &[SmallestSeen]) -> Document {
 }
 
 /// The difference between measured and computed readings, as figures and tables.
-fn evidence(diagnosed: &Diagnosed) -> Document {
-    let diagnosis = &diagnosed.diagnosis;
-    // The nearest cause of a rig without a gap explains nothing.
-    let with_cause = diagnosed.with_cause.as_ref().filter(|_| diagnosis.verdict != Verdict::WithinTolerance);
+fn evidence(diagnosed: &Diagnosed, figures: &Evidence) -> Document {
+    let Diagnosed { diagnosis, study, .. } = diagnosed;
     let mut document = Document::default();
     document.figures(
         "Ends of the steps on the map, coloured by the difference between measured and computed readings.",
-        residual_maps(diagnosed),
+        residual_maps(study, figures),
     );
     if !diagnosis.closure_terms_by_balance.is_empty() {
         let quantities = diagnosis
@@ -170,7 +176,7 @@ fn evidence(diagnosed: &Diagnosed) -> Document {
             .map(|source| format!("{}, {}", source.quantity, source.unit));
         let mut table = Table::new(["step".to_owned()].into_iter().chain(quantities))
             .caption("Missing heat, power or flow of each balance, if it alone has one");
-        for step in 0..diagnosed.study.steps.len() {
+        for step in 0..study.steps.len() {
             let values =
                 diagnosis.closure_terms_by_balance.iter().filter_map(|source| source.steps.get(step));
             let cells = values.map(|[value, low, high]| {
@@ -184,12 +190,12 @@ fn evidence(diagnosed: &Diagnosed) -> Document {
         "Root mean square of the difference between measured and computed readings for each step and channel, in units of the declared \
          uncertainty: 1 is noise. Tolerances are fitted.",
     );
-    document.table(heat_table(diagnosed, "without a cause", &diagnosed.without_cause.1));
-    if let Some((cause, fit)) = with_cause {
-        document.table(heat_table(diagnosed, &format!("with {cause}"), &fit.residual));
+    document.table(heat_table(study, "without a cause", &figures.without_cause.1));
+    if let Some((cause, _, residual)) = &figures.with_cause {
+        document.table(heat_table(study, &format!("with {cause}"), residual));
         document.figures(
             "Measured minus computed readings over time, of the four channels with the largest gap.",
-            traces(diagnosed),
+            traces(study, figures),
         );
     }
     document
@@ -254,8 +260,30 @@ fn describe_removed_residual(term: &ClosureTerm) -> String {
     }
 }
 
-/// One sentence: the most probable answer.
+/// The most probable answer, and what it does to the map.
 pub fn headline(diagnosis: &Diagnosis) -> String {
+    let effect = diagnosis.map_effect.as_ref().map(|effect| format!(": {}", map_effect(effect)));
+    answer(diagnosis) + &effect.unwrap_or_default()
+}
+
+/// Changes of an efficiency below this are not worth a word, fraction.
+const NO_CHANGE: f64 = 5e-4;
+
+fn map_effect(effect: &MapEffect) -> String {
+    let MapEffect { speed_rpm, valve, eta_error, half_interval, .. } = effect;
+    if eta_error.abs().max(*half_interval) < NO_CHANGE {
+        return "no efficiency reads wrong because of it".to_owned();
+    }
+    format!(
+        "from its step alone, efficiency at {:.0} krpm and opening {valve:.2} reads {:.2} +/- {:.2} points {}",
+        speed_rpm / 1e3,
+        100.0 * eta_error.abs(),
+        100.0 * half_interval,
+        if *eta_error > 0.0 { "high" } else { "low" }
+    )
+}
+
+fn answer(diagnosis: &Diagnosis) -> String {
     let first = diagnosis.candidates.first();
     let baseline = diagnosis.baseline.as_ref().map(|baseline| baseline.recording.as_str());
     let seen =
@@ -274,9 +302,11 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
             format!("no cause is named, but {}", suspect_text(&diagnosis.suspects[0]))
         }
         (Verdict::WithinTolerance, _) => format!("nothing beyond the declared tolerances {seen}"),
-        (Verdict::Explained, Some(first)) if is_not_borne_out(&diagnosis.gap) => {
-            format!("{} is the most probable cause; held-out steps do not confirm it", candidate_name(first))
-        }
+        (Verdict::Explained, Some(first)) if is_not_borne_out(&diagnosis.gap) => format!(
+            "{} is the most probable cause, and removes {:.0} % of the gap on held-out steps",
+            candidate_name(first),
+            100.0 * diagnosis.gap.gap_reduction.max(0.0)
+        ),
         (Verdict::Explained, Some(first)) => {
             let verb = if first.effects.len() == 1 { "explains" } else { "explain" };
             let target = baseline
@@ -290,16 +320,17 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
                 "{OUTSIDE} is the most probable{suffix} ({})",
                 probability_text(diagnosis.probability_outside)
             );
-            diagnosis
-                .probable_closure_term()
-                .map_or_else(|| outside.clone(), |term| format!("{outside}: {}", term.sentence))
+            let Some(term) = diagnosis.probable_closure_term() else { return outside };
+            let beside =
+                term.beside_cause.as_ref().map(|beside| format!(", together with {}", cause(beside)));
+            format!("{outside}: {}{}", term.sentence, beside.unwrap_or_default())
         }
     }
 }
 
-/// Whether steps with a gap that the fit of the cause did not see keep it.
+/// Whether steps with a gap that the fit of the cause did not see keep half of it.
 fn is_not_borne_out(gap: &Gap) -> bool {
-    gap.folds.len() > 1 && gap.steps_with_gap > 0 && gap.gap_reduction <= 0.0
+    gap.folds.len() > 1 && gap.steps_with_gap > 0 && gap.gap_reduction <= STANDS_IN
 }
 
 /// Effects in both recordings, which are not judged, if a reference recording was given; and what a campaign declares to do without it.
@@ -379,7 +410,8 @@ fn candidate_name(candidate: &Candidate) -> String {
 /// A cause with its parameters.
 pub(crate) fn cause(candidate: &Candidate) -> String {
     let parameters: Vec<String> = candidate.parameters.iter().map(|(name, e)| parameter(name, e)).collect();
-    format!("{}: {}", candidate_name(candidate), parameters.join(", "))
+    let separator = if parameters.is_empty() { "" } else { ": " };
+    format!("{}{separator}{}", candidate_name(candidate), parameters.join(", "))
 }
 
 fn parameter(name: &str, estimate: &Estimate) -> String {

@@ -10,7 +10,7 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_campaign::units::Kind;
 use mapper_core::{IdentifiedPoint, Plan, Verdict};
-use mapper_diagnose::gap::Diagnosed;
+use mapper_diagnose::gap::{Diagnosed, Evidence};
 use mapper_maps::assemble;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde::Serialize;
@@ -114,11 +114,16 @@ fn json_in_html(data: &impl Serialize) -> Result<String, serde_json::Error> {
 }
 
 /// The page. `machine` and `recording` are names for its title.
-pub fn gap_page(machine: &str, recording: &str, diagnosed: &Diagnosed) -> Result<String, serde_json::Error> {
+pub fn gap_page(
+    machine: &str,
+    recording: &str,
+    diagnosed: &Diagnosed,
+    evidence: &Evidence,
+) -> Result<String, serde_json::Error> {
     let title = format!("Gap between {machine} and its nominal model");
     let body = html! {
         header { h1 { (title) } p.under { "Recording: " (recording) } }
-        main #gap { (gap_document(diagnosed).html()) }
+        main #gap { (gap_document(diagnosed, evidence).html()) }
     };
     shell(&title, &title, Purpose::Still, &(), &body)
 }

@@ -22,7 +22,7 @@ use mapper_core::{
     AvoidedCrossing, AvoidedTime, Channel, DeclaredUncertainty, Event, EventKind, Method, Plan, PointBudgets,
     Recording, ReferenceState, StepKind, TurbineMap, Verdict, step_number,
 };
-use mapper_diagnose::gap::{Diagnosed, PointCorrection};
+use mapper_diagnose::gap::{Diagnosed, Evidence, PointCorrection};
 use mapper_identify::{FittedReadings, ZeroOutcome};
 use mapper_observe::energy_balance::Gases;
 use mapper_recording::score::summarise;
@@ -69,7 +69,7 @@ pub struct RunReport<'a> {
     /// Each step, by its index, with the readings that the fit predicts.
     pub fitted: &'a [(usize, Vec<FittedReadings>)],
     /// The diagnosis of the gap to the nominal model, if there is one.
-    pub gap: Option<&'a Diagnosed>,
+    pub gap: Option<(&'a Diagnosed, &'a Evidence)>,
     /// The map of the turbine, if there is one.
     pub turbine_map: Option<&'a TurbineMap>,
     /// Maps for comparison.
@@ -227,11 +227,11 @@ impl RunReport<'_> {
         document.named_section("corrections", "Before and after the correction", corrections);
         document.named_section("budget", "Uncertainty budget", budget_section(self.budgets));
         document.named_section("plan", "Executed plan", self.executed_plan(&display));
-        if let Some(diagnosed) = self.gap {
+        if let Some((diagnosed, evidence)) = self.gap {
             document.named_section(
                 "gap",
                 "Gap to the nominal model",
-                crate::diagnosis::gap_text::gap_document(diagnosed),
+                crate::diagnosis::gap_text::gap_document(diagnosed, evidence),
             );
         }
         document.named_section("notes", "Notes", self.notes(&display));

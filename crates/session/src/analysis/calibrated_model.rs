@@ -1,7 +1,7 @@
 //! The calibrated model in files: a campaign whose virtual lab is the machine as found, a diagnosis, and a sealed forecast.
 
 use crate::SessionError;
-use crate::recording::files::{DIAGNOSIS_FORMAT, FORECAST_FORMAT, json_text, read_at_most, write_new};
+use crate::recording::files::{FORECAST_FORMAT, json_text, read_at_most, write_new};
 use mapper_diagnose::gap::{CalibratedModelError, Expected, Found};
 use mapper_physics::rig::effect::{Effect, EffectParameter};
 use mapper_planner::sha256_hex;
@@ -119,27 +119,6 @@ fn with_backend(text: &str, block: &str) -> String {
 /// Maximum size of a diagnosis or prediction file, bytes.
 const FILE_MAX_BYTES: u64 = 64 << 20;
 
-/// The fields read from a diagnosis. Those of the first format, which had no number, are the same.
-#[derive(Debug, Deserialize)]
-struct Diagnosis {
-    #[serde(default)]
-    format_version: u32,
-    found: Option<Found>,
-}
-
-/// The identified machine, from the JSON of a diagnosis.
-///
-/// # Errors
-/// [`SessionError::File`] if it cannot be read, [`SessionError::CalibratedModelFile`] if it is not a diagnosis.
-pub fn found_in(path: &Path) -> Result<Found, SessionError> {
-    let diagnosis: Diagnosis = serde_json::from_str(&text_of(path)?)
-        .map_err(|error| wrong(path, format!("not a diagnosis: {error}")))?;
-    check_format(path, diagnosis.format_version, DIAGNOSIS_FORMAT)?;
-    diagnosis.found.ok_or_else(|| {
-        wrong(path, "it contains no identified machine; diagnose one recording without a baseline".to_owned())
-    })
-}
-
 /// A prediction of the next recording, made before that recording is known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -190,18 +169,18 @@ impl SealedForecast {
 }
 
 /// Refuses a file of a later program.
-fn check_format(path: &Path, found: u32, known: u32) -> Result<(), SessionError> {
+pub(crate) fn check_format(path: &Path, found: u32, known: u32) -> Result<(), SessionError> {
     let why =
         || format!("its format_version is {found}, and this program knows {known}: use a newer program");
     if found <= known { Ok(()) } else { Err(wrong(path, why())) }
 }
 
-fn text_of(path: &Path) -> Result<String, SessionError> {
+pub(crate) fn text_of(path: &Path) -> Result<String, SessionError> {
     let bytes = read_at_most(path, FILE_MAX_BYTES)?;
     String::from_utf8(bytes).map_err(|_| wrong(path, "it is not UTF-8".to_owned()))
 }
 
-fn wrong(path: &Path, why: String) -> SessionError {
+pub(crate) fn wrong(path: &Path, why: String) -> SessionError {
     SessionError::CalibratedModelFile { path: path.to_owned(), why }
 }
 

@@ -1,12 +1,13 @@
 //! The diagnosis of a gap, and the experiments that it recommends.
 
+use crate::analysis::diagnosis_file::{MadeFrom, beside, read, refused, sealed};
 use crate::analysis::identification::Identified;
 use crate::plan::planning::{PlanInputs, nominal_model, plan};
 use crate::recording::files::{DIAGNOSIS_FORMAT, Versioned};
 use crate::recording::fusing::{FusedRecordings, fuse_sensors, recordings, take_air_and_probe};
 use crate::recording::identification_config::{expected_rest, identification_with};
 use crate::recording::recording_file::{Recorded, check_machine};
-use crate::{Registry, Session, SessionError, SessionEvent};
+use crate::{Registry, Session, SessionError, SessionEvent, StoredDiagnosisError};
 use mapper_campaign::Campaign;
 use mapper_core::{
     IdentifiedPoint, Method, OperatingPoint, Recording, ResultRemark, RigMode, SetpointRanges, Setpoints,
@@ -15,7 +16,8 @@ use mapper_core::{
 use mapper_diagnose::gap;
 use mapper_diagnose::gap::{
     AllowedJump, AlsoChanged, AtRest, BaselineRecording, Calibration, ClosureSearch, CorrectedMap,
-    Correction, Diagnosed, Expected, Experiment, ForecastCheck, Found, GapRequest, GapWarning, RigRecording,
+    Correction, Diagnosed, Diagnosis, Expected, Experiment, ForecastCheck, Found, GapRequest, GapWarning,
+    RigRecording,
 };
 use mapper_identify::{IdentifyConfig, ZeroSettings, expected_after_zero};
 use mapper_observe::FusedChannel;
@@ -27,7 +29,7 @@ use mapper_planner::PlanRequest;
 use mapper_recording::{ChannelMap, ReadWarning};
 use mapper_report::gap_page;
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::slice;
 use std::sync::Arc;
 
@@ -37,18 +39,25 @@ pub struct Gap {
     pub diagnosed: Diagnosed,
     /// Result of sensor fusion.
     pub sensors: Vec<FusedChannel>,
+    /// What it was made from.
+    pub made_from: MadeFrom,
+    /// The file that it was read from; `None` if it is new.
+    pub stored: Option<PathBuf>,
+    /// Why the file beside the recording was not used.
+    pub not_used: Option<SessionError>,
 }
 
 impl Gap {
-    /// Machine-readable output: diagnosis, identified effects, drift and zero.
+    /// Machine-readable output, also the content of its file: diagnosis, identified effects, drift, zero, and the fits from which others
+    /// continue.
     pub fn json(&self) -> Result<Value, SessionError> {
-        let Diagnosed { diagnosis, drift, zero, .. } = &self.diagnosed;
+        let Diagnosed { diagnosis, drift, zero, found, .. } = &self.diagnosed;
         let versioned = Versioned { format_version: DIAGNOSIS_FORMAT, content: diagnosis };
         let mut value = serde_json::to_value(versioned)?;
         value["candidates"] = json!(diagnosis.listed().collect::<Vec<_>>());
         // An effect that is present in both recordings belongs to the rig; it does not describe a complete machine.
         let is_complete = diagnosis.baseline.is_none();
-        value["found"] = json!(is_complete.then(|| Found::of(&self.diagnosed)).flatten());
+        value["found"] = json!(found.as_ref().filter(|_| is_complete));
         // Without the individual points.
         value["drift"] = drift.as_ref().map_or(
             Value::Null,
@@ -58,12 +67,14 @@ impl Gap {
         if !self.sensors.is_empty() {
             value["sensors"] = json!(self.sensors);
         }
-        Ok(value)
+        value["made_from"] = json!(self.made_from);
+        value["fits"] = json!(self.diagnosed.stored());
+        sealed(value)
     }
 
     /// The page of the diagnosis. `recording`: its name for the title.
     pub fn page(&self, machine: &str, recording: &str) -> Result<String, SessionError> {
-        Ok(gap_page(machine, recording, &self.diagnosed)?)
+        Ok(gap_page(machine, recording, &self.diagnosed, &self.diagnosed.evidence()?)?)
     }
 }
 
@@ -87,6 +98,7 @@ impl Session<'_> {
         let progress = |done_ratio: f64, what: &str| {
             self.send(SessionEvent::Progress { done_ratio, what: what.to_owned() });
         };
+        let made_from = MadeFrom::of(self, recorded, (campaign, map), &effects, baseline.is_some())?;
         let (recording, sensors) = fused(recorded, campaign, map)?;
         let of_baseline = |baseline: &Recorded| -> Result<BaselineRecording, SessionError> {
             let (recording, _) = fused(baseline, campaign, map)?;
@@ -104,7 +116,7 @@ impl Session<'_> {
             warnings: recorded.read.warnings.iter().map(of_reader).collect(),
             progress: &progress,
         })?;
-        Ok(Gap { diagnosed, sensors })
+        Ok(Gap { diagnosed, sensors, made_from, stored: None, not_used: None })
     }
 
     /// Compares the machine found by a diagnosis with an independent recording. Nothing is fitted.
@@ -143,6 +155,55 @@ impl Session<'_> {
         let planned = Recording { steps: steps.collect(), ..Recording::default() };
         let rig = of_rig(planned, model, identification_with(campaign, map), campaign);
         Ok(found.forecast(rig, effects)?)
+    }
+}
+
+impl Session<'_> {
+    /// The diagnosis of a recording: from the file `stored`, from the file beside the recording if it belongs to it, or a new one.
+    ///
+    /// # Errors
+    /// [`SessionError::StoredDiagnosis`] if `stored` does not belong to this recording, campaign, effects and program; as
+    /// [`Session::diagnose_gap`].
+    pub fn gap(
+        &self,
+        recorded: &Recorded,
+        (campaign, map): (&Campaign, &ChannelMap),
+        effects: Vec<Arc<dyn Effect>>,
+        stored: Option<&Path>,
+    ) -> Result<Gap, SessionError> {
+        if let Some(path) = stored {
+            return self.restored(path, recorded, (campaign, map), effects);
+        }
+        let path = beside(recorded);
+        let found = path.is_file().then(|| self.restored(&path, recorded, (campaign, map), effects.clone()));
+        let not_used = match found.transpose() {
+            Ok(Some(gap)) => return Ok(gap),
+            Ok(None) => None,
+            Err(error) => Some(error),
+        };
+        Ok(Gap { not_used, ..self.diagnose_gap(recorded, campaign, map, effects, None)? })
+    }
+
+    fn restored(
+        &self,
+        path: &Path,
+        recorded: &Recorded,
+        (campaign, map): (&Campaign, &ChannelMap),
+        effects: Vec<Arc<dyn Effect>>,
+    ) -> Result<Gap, SessionError> {
+        let (file, text) = read(path)?;
+        let (Some(made_from), Some(fits)) = (file.made_from, file.fits) else {
+            let why = StoredDiagnosisError::NotADiagnosis("it has no fits".to_owned());
+            return Err(refused(path, why));
+        };
+        let wanted = MadeFrom::of(self, recorded, (campaign, map), &effects, false)?;
+        made_from.check(&wanted).map_err(|error| refused(path, error))?;
+        let diagnosis: Diagnosis = serde_json::from_str(&text)
+            .map_err(|error| refused(path, StoredDiagnosisError::NotADiagnosis(error.to_string())))?;
+        let (rig, sensors) = fused(recorded, campaign, map)?;
+        let diagnosed = Diagnosed::restored((diagnosis, file.drift, file.found), fits, &rig, effects)
+            .map_err(|error| refused(path, error.into()))?;
+        Ok(Gap { diagnosed, sensors, made_from, stored: Some(path.to_owned()), not_used: None })
     }
 }
 
@@ -195,17 +256,16 @@ pub struct GapCorrection {
 }
 
 impl Session<'_> {
-    /// Diagnoses a recording and identifies it again without the causes found. With `directory`, the results are written there as those of an
+    /// Identifies a diagnosed recording again without the causes found. With `directory`, the results are written there as those of an
     /// identification.
     pub fn correct_gap(
         &self,
+        gap: Gap,
         recorded: &Recorded,
-        (campaign, map): (&Campaign, &ChannelMap),
-        effects: Vec<Arc<dyn Effect>>,
+        map: &ChannelMap,
         method: Option<Method>,
         directory: Option<&Path>,
     ) -> Result<GapCorrection, SessionError> {
-        let gap = self.diagnose_gap(recorded, campaign, map, effects, None)?;
         self.send(SessionEvent::Progress { done_ratio: 1.0, what: "identification".to_owned() });
         let quiet = Session::new(self.registry);
         let identify = |recording: Recording| {

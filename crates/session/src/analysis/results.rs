@@ -254,7 +254,9 @@ impl Session<'_> {
             turbine_map: turbine_map.as_ref(),
             ..run_report(&origin, &identified, results, &program)
         };
-        Ok(RunReport { others: &others, gap: gap.map(|gap| &gap.diagnosed), ..report }.page()?)
+        let evidence = gap.map(|gap| gap.diagnosed.evidence()).transpose()?;
+        let gap = gap.zip(evidence.as_ref()).map(|(gap, evidence)| (&gap.diagnosed, evidence));
+        Ok(RunReport { others: &others, gap, ..report }.page()?)
     }
 
     /// Writes the files of an identification. After a file that cannot be written, the others are not written; the results are still returned.

@@ -127,14 +127,14 @@ impl<'a> CalibrationSettings<'a> {
             warnings: Vec::new(),
             progress: &|_, _| {},
         });
-        Ok(diagnosed.ok().map(|diagnosed| observe(case, &self.before, &diagnosed)))
+        Ok(diagnosed.ok().and_then(|diagnosed| observe(case, &self.before, &diagnosed)))
     }
 }
 
-fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> DiagnosisSummary {
+fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Option<DiagnosisSummary> {
     let truth: Vec<(String, Vec<f64>)> = case.causes.iter().map(Cause::id_and_values).collect();
-    let Scores { nothing, candidates, features, errors_sigma } = diagnosed.scores(calibration, &truth);
-    DiagnosisSummary {
+    let Scores { nothing, candidates, features, errors_sigma } = diagnosed.scores(calibration, &truth)?;
+    Some(DiagnosisSummary {
         kind: case.kind,
         causes: truth.into_iter().map(|(id, _)| id).collect(),
         verdict: diagnosed.diagnosis.verdict,
@@ -143,7 +143,7 @@ fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Dia
         candidates,
         features,
         errors_sigma,
-    }
+    })
 }
 
 /// Weight of each case, 1 on average. The threshold needs many cases without a cause; together they count only as much as the

@@ -84,12 +84,18 @@ impl At {
 pub(super) struct Numbers(Arc<[f64]>);
 
 /// A compiled script with a unique number.
-#[derive(Debug)]
 pub(super) struct Program {
     id: u64,
     text: String,
     parameters: Vec<String>,
     defined: BTreeSet<String>,
+}
+
+/// Equal for equal scripts.
+impl std::fmt::Debug for Program {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.text)
+    }
 }
 
 struct Compiled {

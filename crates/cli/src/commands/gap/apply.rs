@@ -13,7 +13,7 @@ use std::path::PathBuf;
 pub struct Apply {
     /// Campaign that was diagnosed (YAML)
     pub campaign: PathBuf,
-    /// Diagnosis, as `mapper gap diagnose --json` prints it
+    /// Diagnosis, as `mapper gap diagnose --out` writes it
     pub diagnosis: PathBuf,
     /// New campaign file (YAML)
     #[arg(long, value_name = "FILE")]

@@ -3,6 +3,7 @@
 use crate::command_line::channel_map;
 use crate::commands::identify::MethodArgument;
 use crate::environment::registry;
+use crate::interrupt;
 use crate::output::failure::Failure;
 use crate::output::{output_options, standard_output};
 use clap::Args;
@@ -12,7 +13,7 @@ use mapper_session::{Recorded, Session, SessionError};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Diagnose a recording, identify it again with its causes corrected, and show the map before and after
+/// Identify a recording again without the causes of its diagnosis, and show the map before and after
 #[derive(Debug, Args)]
 pub struct Correct {
     /// Campaign with machine, declared uncertainties and tolerances (YAML)
@@ -22,6 +23,9 @@ pub struct Correct {
     /// Write points, map, pictures and report to this directory, corrected if a correction is allowed; existing files are not replaced
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Diagnosis, as `gap diagnose` writes it [default: the one beside the recording if it belongs to it, otherwise a new one]
+    #[arg(long, value_name = "FILE")]
+    pub diagnosis: Option<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
     #[arg(long, value_name = "MAP")]
     pub channels: Option<PathBuf>,
@@ -47,14 +51,17 @@ impl Correct {
         let on_event = |event: &_| progress.show(event);
         let session = Session { on_event: &on_event, ..Session::new(&registry) };
         let method = self.method.map(Method::from);
-        let corrected =
-            session.correct_gap(&recorded, (&campaign, &map), effects, method, self.out.as_deref())?;
+        interrupt::end_at_once()?;
+        let gap = session.gap(&recorded, (&campaign, &map), effects, self.diagnosis.as_deref())?;
+        standard_output::warn_of_unused(&gap);
+        let corrected = session.correct_gap(gap, &recorded, &map, method, self.out.as_deref())?;
         progress.clear();
         if self.json {
             let warnings: Vec<String> = recorded.read.warnings.iter().map(ToString::to_string).collect();
             let values = || {
                 Ok::<_, SessionError>(json!({
                     "correction": corrected.map,
+                    "diagnosis_file": corrected.gap.stored,
                     "diagnosis": corrected.gap.json()?,
                     "identified": corrected.identified.json(Some(&recorded.path), &warnings),
                 }))

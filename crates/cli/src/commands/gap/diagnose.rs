@@ -2,15 +2,19 @@
 
 use crate::command_line::channel_map;
 use crate::environment::registry;
+use crate::interrupt;
 use crate::output::failure::{Code, Failure};
 use crate::output::standard_output::FileOutput;
 use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_diagnose::gap::ClosureTerm;
 use mapper_report::{Describe, Document, headline, with_messages};
-use mapper_session::{DIAGNOSIS_FORMAT, Gap, Recorded, Session, SessionEvent, check_all_distinct};
+use mapper_session::{
+    DIAGNOSIS_FORMAT, Existing, Gap, Recorded, Session, SessionEvent, check_all_distinct, diagnosis_of_run,
+    json_text, write_file,
+};
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Find where a recording departs from the nominal model, which effect causes it, how much that reduces the gap, and what to do next
 #[derive(Debug, Args)]
@@ -32,11 +36,18 @@ pub struct Diagnose {
     /// Also try a suspected effect written in rhai; may be repeated
     #[arg(long = "effect", value_name = "FILE")]
     pub effects: Vec<PathBuf>,
+    /// List causes below 5 %, too
+    #[arg(long)]
+    pub all: bool,
     /// Write each closure term that is found as an effect in rhai into this directory
     #[arg(long, value_name = "DIR")]
     pub closure_terms: Option<PathBuf>,
+    /// Write the diagnosis to this file, from which `gap correct`, `report --gap`, `gap apply` and `gap predict` continue [default: beside the
+    /// recording of a run directory]
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
     /// Also write an HTML page with pictures to this new file
-    #[arg(long, value_name = "OUT")]
+    #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
     #[command(flatten)]
     pub output: FileOutput,
@@ -45,7 +56,8 @@ pub struct Diagnose {
 impl Diagnose {
     /// Diagnoses one recording, or each of several.
     pub fn run(&self) -> Result<(), Failure> {
-        self.html.iter().try_for_each(|file| self.output.existing().check(file))?;
+        self.html.iter().chain(&self.out).try_for_each(|file| self.output.existing().check(file))?;
+        interrupt::end_at_once()?;
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;
         let registry = registry();
@@ -60,16 +72,21 @@ impl Diagnose {
         let recordings: Vec<Recorded> =
             recordings.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
         check_all_distinct(recordings.iter().chain(&baseline))?;
-        if (self.html.is_some() || self.closure_terms.is_some()) && recordings.len() > 1 {
-            let message = "--html and --closure-terms need exactly one recording (a resumed run has several)";
+        let files = [&self.html, &self.closure_terms, &self.out];
+        if files.iter().any(|file| file.is_some()) && recordings.len() > 1 {
+            let message =
+                "--out, --html and --closure-terms need exactly one recording (a resumed run has several)";
             return Err(Failure::new(Code::BadInput, message));
         }
+        let kept = self.out.clone().or_else(|| recordings.first().and_then(diagnosis_of_run));
         let mut gaps = Vec::with_capacity(recordings.len());
         for recorded in recordings {
             let on_event = |event: &_| progress.show(event);
             let session = Session { on_event: &on_event, ..Session::new(&registry) };
-            let gap = session.diagnose_gap(&recorded, &campaign, &map, effects.clone(), baseline.as_ref())?;
+            let mut gap =
+                session.diagnose_gap(&recorded, &campaign, &map, effects.clone(), baseline.as_ref())?;
             progress.clear();
+            gap.diagnosed.diagnosis.lists_all = self.all;
             gaps.push((recorded.path.display().to_string(), gap));
         }
         if let [(title, gap)] = &mut gaps[..] {
@@ -77,6 +94,9 @@ impl Diagnose {
             if let Some(file) = &self.html {
                 let page = gap.page(&campaign.machine.name, title)?;
                 self.output.write(file, page.as_bytes())?;
+            }
+            if let Some(file) = kept {
+                self.write_diagnosis(&file, gap)?;
             }
         }
         if let [(_, gap)] = &gaps[..] {
@@ -102,6 +122,18 @@ impl Diagnose {
         let head = |(path, gap): &(String, Gap)| format!("{path}: {}", headline(&gap.diagnosed.diagnosis));
         document.list(gaps.iter().map(head));
         standard_output::show(&document)
+    }
+
+    /// Writes the file of the diagnosis. That of a run directory belongs to the program, which replaces it.
+    fn write_diagnosis(&self, file: &Path, gap: &Gap) -> Result<(), Failure> {
+        let text = json_text(&with_messages(|| gap.json())?)?;
+        if self.out.is_some() {
+            return Ok(self.output.write(file, text.as_bytes())?);
+        }
+        if let Err(error) = write_file(file, text.as_bytes(), Existing::Replaced) {
+            standard_output::warn(&format!("the diagnosis is not kept: {error}\n"));
+        }
+        Ok(())
     }
 
     /// Writes the closure terms that can be written into `directory`; next to the page if only that was asked for.

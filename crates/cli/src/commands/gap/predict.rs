@@ -15,7 +15,7 @@ use std::path::PathBuf;
 pub struct Predict {
     /// Campaign of the next recording (YAML)
     pub campaign: PathBuf,
-    /// Diagnosis, as `mapper gap diagnose --json` prints it; makes a forecast
+    /// Diagnosis, as `mapper gap diagnose --out` writes it; makes a forecast
     #[arg(long, value_name = "FILE", required_unless_present = "recording")]
     pub diagnosis: Option<PathBuf>,
     /// The forecast: a new file with --diagnosis, an existing one with --recording

@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 /// The best fit of a hypothesis.
 #[derive(Debug, Clone)]
-pub struct Fit {
+pub(crate) struct Fit {
     /// Best values of nuisances and effects.
     pub hypothesis: Hypothesis,
     /// Sum of the squared whitened residuals and the squared nuisances.
@@ -396,7 +396,7 @@ const NO_LENGTH: f64 = 1e-6;
 
 /// Residual of a fit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Adequacy {
+pub(crate) struct Adequacy {
     /// Energy in the smooth basis above its expectation, in its standard deviations.
     pub smooth_sigma: f64,
     /// Energy in the smooth basis above its expectation.
@@ -407,7 +407,7 @@ pub struct Adequacy {
 
 impl Adequacy {
     /// Features for the probability of an unmodelled cause.
-    pub fn features(&self) -> [f64; 2] {
+    pub(crate) fn features(&self) -> [f64; 2] {
         [self.smooth_sigma, self.scatter_sigma]
     }
 }

@@ -2,4 +2,5 @@
 
 pub(crate) mod coordinate;
 pub(crate) mod fit;
+pub(crate) mod fitted_causes;
 pub(crate) mod normal;

@@ -15,7 +15,8 @@ use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::lagged_command::ramp_end_s;
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
-use mapper_physics::rig::effect::{Effect, EffectError, EffectParameter, Rig, add};
+use mapper_physics::machine::params::Params;
+use mapper_physics::rig::effect::{Effect, EffectError, EffectInfo, EffectParameter, NamedValues, Rig, add};
 use mapper_physics::simulation::driven::{DriveError, FrozenGrid};
 use mapper_physics::simulation::model::Model;
 use nalgebra::DMatrix;
@@ -140,6 +141,43 @@ fn blocks_of_ramp(table: &Table, (start_s, ramp_end_s, end_s): (f64, f64, f64)) 
     of_step
 }
 
+/// An effect that the campaign declares in part, and perhaps too high: it may also take away what is declared.
+#[derive(Debug)]
+struct DeclaredInPart {
+    info: EffectInfo,
+    effect: Arc<dyn Effect>,
+}
+
+impl DeclaredInPart {
+    /// The effect with its range down to what is declared; itself if nothing is.
+    fn of(effect: Arc<dyn Effect>, declared: &Params) -> Arc<dyn Effect> {
+        let declared = match effect.info().id.as_ref() {
+            "humidity" => declared.compressor.humidity_kg_kg,
+            "area_split" => declared.compressor.alpha_area_ratio,
+            "inlet_preheat" => declared.compressor.inlet_conductance_w_k,
+            "tip_diameter" => declared.t2_probe_diameter_m,
+            "stem_conduction" => declared.t2_probe_stem_ratio,
+            _ => 0.0,
+        };
+        let mut info = effect.info().clone();
+        match &mut info.parameters[..] {
+            [size] if declared > 0.0 => size.low -= declared,
+            _ => return effect,
+        }
+        Arc::new(DeclaredInPart { info, effect })
+    }
+}
+
+impl Effect for DeclaredInPart {
+    fn info(&self) -> &EffectInfo {
+        &self.info
+    }
+
+    fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError> {
+        self.effect.prepare(values, rig)
+    }
+}
+
 impl Study {
     /// Compared channels, in the order of all outputs.
     pub const OUTPUTS: [Channel; OUTPUTS.len()] = OUTPUTS;
@@ -170,6 +208,8 @@ impl Study {
         let timed = times.timed(recording);
         let mut nominal = Rig::new(model);
         nominal.instruments.p3_lag_s = declared.tolerances.actuator_lag_s;
+        let effects: Vec<Arc<dyn Effect>> =
+            effects.into_iter().map(|effect| DeclaredInPart::of(effect, &nominal.model.params)).collect();
         let first_s = table.t_s.first().copied().unwrap_or(0.0);
         let steps: Vec<StudyStep> = recording
             .steps

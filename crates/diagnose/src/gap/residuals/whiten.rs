@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// The study linearised at a hypothesis: prediction, whitening, derivatives of nuisances, and changes due to effects.
 #[derive(Debug)]
-pub struct Linearised {
+pub(crate) struct Linearised {
     /// Where.
     hypothesis: Hypothesis,
     /// Prediction there.
@@ -58,7 +58,7 @@ impl Noise {
 
 impl Linearised {
     /// Linearises at the nominal model.
-    pub fn new(study: &Study) -> Result<Linearised, PredictError> {
+    pub(crate) fn new(study: &Study) -> Result<Linearised, PredictError> {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
         let machine = LinearisedMachine::of(&base.run);
@@ -76,7 +76,7 @@ impl Linearised {
     }
 
     /// Linearises at a hypothesis and keeps the whitening.
-    pub fn at(&self, study: &Study, hypothesis: &Hypothesis) -> Result<Linearised, PredictError> {
+    pub(crate) fn at(&self, study: &Study, hypothesis: &Hypothesis) -> Result<Linearised, PredictError> {
         let base = study.predict(hypothesis)?;
         let machine = LinearisedMachine::of(&base.run);
         let changes = nuisance_changes(study, hypothesis, &base, &machine);
@@ -154,7 +154,7 @@ impl Linearised {
     }
 
     /// Whitened residual of a prediction.
-    pub fn residual(&self, study: &Study, prediction: &Prediction) -> Vec<f64> {
+    pub(crate) fn residual(&self, study: &Study, prediction: &Prediction) -> Vec<f64> {
         let mut residual: Vec<f64> =
             study.measured.iter().zip(&prediction.values).map(|(seen, predicted)| seen - predicted).collect();
         self.whiten(study, &mut residual);

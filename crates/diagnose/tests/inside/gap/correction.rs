@@ -1,6 +1,6 @@
 //! Readings without the causes of a gap.
 
-use crate::gap::consequence::Changes;
+use crate::gap::best_fit::fitted_causes::Changes;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::inside::gap::common::{Visits, declared, record_of};
 use mapper_core::{Channel, Recording};
@@ -83,5 +83,22 @@ fn readings_without_a_cause_are_those_of_a_rig_that_never_had_it() {
             before_k > 0.5 && after_k < 0.05 * before_k + 0.02,
             "{id}: {before_k} K before, {after_k} K after"
         );
+    }
+}
+
+/// A wheel, turbine, bearing or valve that differs is measured as it is: no reading is biased, so none is changed.
+#[test]
+fn a_machine_that_differs_keeps_its_readings() {
+    for (id, value) in [
+        ("efficiency_scale", 0.97),
+        ("flow_map_scale", 1.03),
+        ("turbine_efficiency", 0.95),
+        ("turbine_capacity", 1.03),
+        ("bearing_friction", 1e-6),
+        ("valve_area", 1.05),
+    ] {
+        let (with, without, changes) = planted(id, value);
+        assert_ne!(with.series[&Channel::P2].values, without.series[&Channel::P2].values, "{id}");
+        assert_eq!(changes.subtracted_from(with.clone()), with, "{id}");
     }
 }

@@ -122,8 +122,9 @@ fn nothing_is_called_nothing() {
     assert!((sum - 1.0).abs() < 1e-9, "{sum}");
     // Mean square of whitened noise: 1 within four standard deviations (sqrt(2/n)), and slightly less because of the input uncertainty and
     // of jumps near surge.
-    let n = diagnosed.null.residual.len() as f64;
-    let mean_square = diagnosed.null.residual.iter().map(|r| r * r).sum::<f64>() / n;
+    let library = diagnosed.library.as_ref().unwrap();
+    let n = library.null.residual.len() as f64;
+    let mean_square = library.null.residual.iter().map(|r| r * r).sum::<f64>() / n;
     assert!((0.8..1.0 + 4.0 * (2.0 / n).sqrt()).contains(&mean_square), "{mean_square}");
 }
 
@@ -201,13 +202,17 @@ fn two_effects_are_both_named_and_each_takes_off_the_square_of_its_signature() {
     // Gain of both compared with the meter alone and with none.
     let meter = 3;
     let study = &diagnosed.study;
-    let alone =
-        crate::gap::best_fit::fit::lengths(study, &diagnosed.linearised, &vec![(meter, vec![1.02])]).unwrap();
+    let alone = crate::gap::best_fit::fit::lengths(
+        study,
+        &diagnosed.library.as_ref().unwrap().linearised,
+        &vec![(meter, vec![1.02])],
+    )
+    .unwrap();
     let fits = |wanted: &[usize]| {
         let named = |f: &&crate::gap::best_fit::fit::Fit| {
             crate::gap::residuals::study::members(&f.hypothesis) == wanted
         };
-        diagnosed.fits.iter().find(named).map(|f| f.cost)
+        diagnosed.library.as_ref().unwrap().fits.iter().find(named).map(|f| f.cost)
     };
     let (both, stem) = (fits(&[1, meter]).unwrap(), fits(&[1]).unwrap());
     // A gain of d^2 has a standard deviation of 2 d, so its root one of 1; allow four of them.
@@ -278,7 +283,8 @@ fn what_is_not_recorded_is_reported_and_the_rest_is_diagnosed() {
 fn a_jump_tells_a_slow_probe_from_its_rival_and_from_itself_nothing() {
     let diagnosed = ask(&record(&[("tip_diameter", &[1e-3])], 9)).unwrap();
     let of = |id: &str| {
-        diagnosed
+        let library = diagnosed.library.as_ref().unwrap();
+        library
             .fits
             .iter()
             .find(|fit| {
@@ -362,7 +368,7 @@ fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
 fn the_model_calibrated_in_one_night_forecasts_the_next() {
     let truth: [(&str, &[f64]); 2] = [("tip_diameter", &[2e-3]), ("bearing_friction", &[6e-7])];
     let first = ask(&record(&truth, 21)).unwrap();
-    let found = Found::of(&first).unwrap();
+    let found = first.found.clone().unwrap();
     let next = next_night(&truth, 21);
     let next = RigRecording::simulated(next, declared(), Model::nominal());
     let check = |found: &Found| {
@@ -409,4 +415,19 @@ fn the_smallest_size_that_is_seen_is_seen() {
         diagnosis.verdict == Verdict::Explained && diagnosis.candidates[0].effects == [id]
     };
     assert!(named(2.0) && !named(0.3), "{id} {value}");
+}
+
+/// 16 g/kg of water are declared, and the rig is dry.
+#[test]
+fn water_that_is_declared_and_absent_is_a_cause() {
+    let recording = record_of(&Rig::new(Model::nominal()), 5);
+    let mut model = Model::nominal();
+    model.params.compressor.humidity_kg_kg = 0.016;
+    let candidates = effects(&["humidity", "efficiency_scale", "flowmeter_gain", "recirculation"]);
+    let diagnosed = gap(request(&recording, declared(), model, candidates)).unwrap();
+    let first = &diagnosed.diagnosis.candidates[0];
+    assert_eq!(diagnosed.diagnosis.verdict, Verdict::Explained, "{:?}", diagnosed.diagnosis.candidates);
+    assert_eq!(first.effects, ["humidity"]);
+    let found = &first.parameters["humidity"];
+    assert!(found.low <= -0.016 && -0.016 <= found.high && found.high < 0.0, "{found:?}");
 }

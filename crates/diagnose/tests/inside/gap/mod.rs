@@ -7,4 +7,5 @@ mod correction;
 mod diagnose;
 mod near_surge;
 mod next;
+mod stored;
 mod structure;

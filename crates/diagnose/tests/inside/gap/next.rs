@@ -63,7 +63,7 @@ fn fit_of<'a>(diagnosed: &'a Diagnosed, id: &str) -> &'a Fit {
         let [(index, _)] = fit.hypothesis.effects.as_slice() else { return false };
         diagnosed.study.effects[*index].info().id == id
     };
-    diagnosed.fits.iter().find(is_it).unwrap()
+    diagnosed.library.as_ref().unwrap().fits.iter().find(is_it).unwrap()
 }
 
 /// Heat to the oil or to the cell: an oil step changes the driving temperature of only one of them.

@@ -1,4 +1,4 @@
-"""Orders of the same points on four machines: what the plan expects, and how far many seeds then err.
+"""Orders of the same points on several machines: what the plan expects, and how far many seeds then err.
 
     cargo build --release --locked
     python3 benches/orders.py --mapper target/release/mapper --write docs/validation/orders.md
@@ -11,6 +11,7 @@ rise (`method: steady`), without a zero. The machines:
 - bent map: its efficiency falls by 6 points more towards low speed, as 1/N^2, and the program knows its map;
 - other housing: a heavier housing, another law of convection, a map that drops steeply at choke, a tenth of the area before the wheel;
   all of it declared;
+- paper's heat: turbo_a with the oil conductance, friction heat and probe of campaigns/turbo_paper.yaml, all declared;
 - alpha_A 0.12: turbo_a with 0.12 of its internal area before the wheel, of which nothing is declared.
 """
 
@@ -37,8 +38,13 @@ OTHER_HOUSING = [
     ("\n      alpha_area: 0 ", "\n      alpha_area: 0.1 "),
     ("\n  alpha_area: 0       # what", "\n  joint: {alpha_area: fixed}\n  alpha_area: 0.1     # what"),
 ]
+PAPER_HEAT = [
+    ("oil_conductance: 8 W/K", "oil_conductance: 9 W/K\n      friction_heat: 440 W"),
+    ("probe_diameter: 0 mm}", "probe_diameter: 1.5 mm}"),
+]
 MACHINES = {
     "turbo_a": [],
+    "paper's heat": PAPER_HEAT,
     "bent map": [("map: closed_form", "map: {file: bent.csv, reference: SAE}")],
     "other housing": OTHER_HOUSING,
     "alpha_A 0.12": [("virtual_lab: {}", "virtual_lab: {machine: {alpha_area: 0.12}}")],

@@ -15,7 +15,7 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
 REPOSITORY = pathlib.Path(__file__).resolve().parent.parent
-SHIPPED = ["gap_rig", "grid18", "turbo_a", "turbo_a_adiabatic", "turbo_a_conventional", "turbo_a_lines", "turbo_a_redundant", "turbo_a_surge"]
+SHIPPED = ["gap_rig", "grid18", "turbo_a", "turbo_a_adiabatic", "turbo_a_conventional", "turbo_a_lines", "turbo_a_redundant", "turbo_a_surge", "turbo_paper"]
 
 
 def diagnosed(program, name, seed):

@@ -16,7 +16,7 @@ use std::sync::{Arc, LazyLock};
 const NAME: &str = "DataFrame";
 const MAGIC: &[u8] = b"mapper DataFrame\n";
 const VALUE_BYTES: usize = 8;
-const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open, write: None };
 
 /// Every plug-in of the package. It starts no drivers: a rig in real time is run by the command, which handles all signals.
 pub fn plugins() -> Registry {

@@ -349,6 +349,20 @@ mod tests {
         });
     }
 
+    /// YAML 1.1 reads these words as true and false, and its programs write those instead.
+    #[test]
+    fn every_on_and_off_may_be_true_and_false() {
+        visit(&json_schema(), &mut |object| {
+            for (word, flag) in [("off", false), ("no", false), ("on", true), ("yes", true)] {
+                let names = object.get("enum").and_then(Value::as_array).into_iter().flatten();
+                let constant = object.get("const") == Some(&Value::from(word));
+                if constant || names.clone().any(|name| name == word) {
+                    assert!(names.clone().any(|name| *name == Value::Bool(flag)), "{object:?}");
+                }
+            }
+        });
+    }
+
     #[test]
     fn a_validator_without_the_own_keyword_accepts_turbo_a_and_sees_mistakes() {
         // Validates as an editor does.

@@ -27,7 +27,7 @@ pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<
             is_error: true,
             at: steps!["limits", "speed"].to_vec(),
             message: format!(
-                "the limit, {} krpm, is below {} of {} lines of the grid, the slowest of them with {:.2} krpm at T1 = {:.2} K",
+                "the limit, {:.2} krpm, is below {} of {} lines of the grid, the slowest of them with {:.2} krpm at T1 = {:.2} K",
                 limit_rpm / 1e3,
                 above_rpm.len(),
                 campaign.lines.len(),
@@ -46,7 +46,7 @@ pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<
                 is_error: true,
                 at: at("speed_corrected"),
                 message: format!(
-                    "{krpm} krpm corrected are {:.2} krpm at T1 = {:.2} K, above `limits.speed`, {} krpm",
+                    "{krpm:.2} krpm corrected are {:.2} krpm at T1 = {:.2} K, above `limits.speed`, {:.2} krpm",
                     speed_rpm / 1e3,
                     campaign.boundary.t1_k,
                     limit_rpm / 1e3

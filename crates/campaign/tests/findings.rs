@@ -813,7 +813,10 @@ fn unreachable_points_are_complained_about_at_their_entry() {
     assert_eq!(findings.list.len(), 1, "{findings}");
     assert_eq!(findings.list[0].path, "grid.speeds[1]", "{findings}");
     assert_eq!((findings.list[0].line, findings.list[0].column), (19, 21), "{findings}");
-    assert!(findings.list[0].message.contains("110 krpm at opening 1 needs P3 = 185.4 kPa"), "{findings}");
+    assert!(
+        findings.list[0].message.contains("110 krpm, valve area 100 % needs P3 = 185.4 kPa"),
+        "{findings}"
+    );
     assert!(
         findings.list[0].message.contains("above `limits.turbine_inlet_pressure.max` = 180 kPa"),
         "{findings}"

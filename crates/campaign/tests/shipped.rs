@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_campaign::campaign::MapSource;
-use mapper_campaign::{CampaignError, load};
+use mapper_campaign::{CampaignError, check, load, read_named_file};
 use mapper_core::{Channel, Dwell, EfficiencyDefinition, ReferenceState, VisitOrder, WindowRule};
 use mapper_physics::machine::params::{BoundaryConditions, Params};
 use std::path::{Path, PathBuf};
@@ -26,6 +26,27 @@ fn every_shipped_campaign_is_right() {
         }
     }
     assert!(count > 0);
+}
+
+/// As PyYAML writes them: it reads a plain `off` as false (YAML 1.1, <https://yaml.org/type/bool.html>).
+#[test]
+fn campaigns_that_another_yaml_program_rewrote_are_the_same() {
+    let mut rewritten = 0;
+    for name in ["turbo_a.yaml", "gap_rig.yaml", "grid18.yaml", "nightly/heavy.yaml"] {
+        let path = directory().join(name);
+        let shipped = std::fs::read_to_string(&path).unwrap();
+        for more in ["", "\nspeed_control: off\n"] {
+            let text = shipped.clone() + more;
+            let other = text.replace(": off\n", ": false\n");
+            rewritten += usize::from(other != text);
+            let read = |text: &str| {
+                let campaign = check(text, &path, &read_named_file).unwrap_or_else(|error| panic!("{error}"));
+                serde_json::to_string(&campaign).unwrap()
+            };
+            assert_eq!(read(&other), read(&text), "{name}");
+        }
+    }
+    assert!(rewritten > 4, "{rewritten}");
 }
 
 #[test]

@@ -92,7 +92,7 @@ pub use test_plan::plan::{
     Advice, CampaignChange, Plan, PlanFigures, PlanInputHashes, PlanRemark, PlanStep, Predicted, Ramp, Ramps,
     StepKind, Transition, UndeclaredForecast, VerdictForecast,
 };
-pub use test_plan::points::{Dwell, Jump, OperatingPoint, Repeats, Timing, VisitOrder};
+pub use test_plan::points::{Dwell, Jump, OperatingPoint, Repeats, Timing, VisitOrder, valve_area_text};
 pub use test_plan::step_number::step_number;
 pub use text::{
     coloured_text, one_line, probability_text, readable, shorten_numbers, temperature, terminal_json,

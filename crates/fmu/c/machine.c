@@ -7,6 +7,8 @@
 
 /* Flow below which the gas path is not evaluated (it divides by the flow), kg/s. */
 #define LOWEST_FLOW_KG_S 1e-4
+/* Shaft speed to which the friction heat of the bearing refers, rad/s. */
+#define RAD_S_AT_100_KRPM (1e5 * PI / 30.0)
 
 static double largest(double a, double b) { return a > b ? a : b; }
 
@@ -266,7 +268,9 @@ void machine_at(double *r, const int *switches, const double *y, double *rates) 
     const double tc_k = y[COMPRESSOR_HOUSING], tt_k = y[TURBINE_HOUSING];
     const double to_bearing = 2.0 * r[VR_bearing_conductivity] * r[VR_bearing_section_area] / r[VR_bearing_length];
     const double to_oil = r[VR_bearing_oil_conductance];
-    const double bearing_k = (to_bearing * (tt_k + tc_k) + to_oil * r[VR_T_oil]) / (2.0 * to_bearing + to_oil);
+    const double friction = r[VR_bearing_friction_heat] * pow(y[SPEED] / RAD_S_AT_100_KRPM, 2);
+    const double bearing_k =
+        (to_bearing * (tt_k + tc_k) + to_oil * r[VR_T_oil] + friction) / (2.0 * to_bearing + to_oil);
     double valve_kg_s, inner_heat_w, target_k, radiation_w, balance_w, capacity;
     target_k = outputs(r, switches, y, &valve_kg_s, &inner_heat_w);
     r[VR_m_valve] = valve_kg_s;

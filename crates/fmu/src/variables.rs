@@ -113,6 +113,7 @@ pub fn variables(machine: &FmuMachine<'_>) -> Vec<Variable> {
         parameter("bearing.section_area", b.section_area_m2, "m2", "bearing housing"),
         parameter("bearing.length", b.length_m, "m", "bearing housing"),
         parameter("bearing.oil_conductance", b.oil_conductance_w_k, "W/K", "from the bearing housing to the oil"),
+        parameter("bearing.friction_heat", b.friction_heat_w, "W", "heat of friction to the bearing housing at 100 krpm, rising with the square of the speed"),
         parameter("bearing.friction", params.bearing_friction_w_s2, "W.s2/rad2", "friction power over the square of the shaft speed"),
         parameter("shaft.inertia", params.shaft_inertia_kgm2, "kg.m2", "shaft with both wheels"),
         parameter("outlet.volume", params.outlet.volume_m3, "m3", "between compressor and valve"),

@@ -166,6 +166,7 @@ fn odd() -> Params {
     params.t2_probe_stem_ratio = 0.03;
     params.t2_probe_recovery_ratio = 0.9;
     params.bearing_friction_w_s2 = 5e-7;
+    params.bearing.friction_heat_w = 300.0;
     params.external_convection_ratio = 1.5;
     params.radiation_area_m2 = 4e-3;
     params

@@ -46,7 +46,9 @@ impl PointRow {
     /// The point in words.
     pub fn label(&self) -> String {
         let visit = if self.visit == 0 { String::new() } else { format!(", visit {}", self.visit + 1) };
-        format!("{} krpm at opening {}{visit}", self.speed_rpm / 1e3, self.valve_opening_ratio)
+        let (krpm, valve) =
+            ((self.speed_rpm / 10.0).round() / 100.0, (1e3 * self.valve_opening_ratio).round() / 10.0);
+        format!("{krpm} krpm, valve area {valve} %{visit}")
     }
 }
 
@@ -220,9 +222,9 @@ metrics! {
     /// Mean true efficiency, fraction.
     EtaTrueMean "eta_true_mean" "mean true efficiency" "%" 100.0 Absolute 5e-4,
     /// Median absolute error of the efficiency, fraction.
-    EtaMedianError "eta_median_error" "median error of the efficiency" "%points" 100.0 Absolute 5e-4,
+    EtaMedianError "eta_median_error" "median error of the efficiency" "points" 100.0 Absolute 5e-4,
     /// Largest absolute error of the efficiency, fraction.
-    EtaWorstError "eta_worst_error" "largest error of the efficiency" "%points" 100.0 Absolute 5e-4,
+    EtaWorstError "eta_worst_error" "largest error of the efficiency" "points" 100.0 Absolute 5e-4,
     /// Share of the points whose 95 % interval contains the true efficiency, ratio.
     EtaCoverage "eta_coverage" "intervals that contain the true efficiency" "%" 100.0 Absolute 0.02,
     /// Mean identified heat-transfer coefficient, W/(m2 K).

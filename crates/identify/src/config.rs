@@ -74,6 +74,9 @@ pub struct IdentifyConfig {
     pub reference: ReferenceState,
     /// The compressed air.
     pub air: Air,
+    /// Diameter of the compressor wheel at its exit, m; `None` if it is not declared.
+    #[serde(default)]
+    pub wheel_diameter_m: Option<f64>,
     /// The gas of the turbine.
     pub turbine_gas: Gas,
     /// The turbine as declared: housing and wheel.
@@ -134,6 +137,7 @@ impl Default for IdentifyConfig {
             joint: JointSettings::default(),
             reference: ReferenceState::SAE,
             air: Air::PAPER,
+            wheel_diameter_m: None,
             turbine_gas: Gas::CLOSED_FORM_AIR,
             turbine: Params::default().turbine,
             shaft_inertia_kgm2: Params::default().shaft_inertia_kgm2,

@@ -3,7 +3,7 @@
 use crate::server::OperatorCommand;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{Channel, IdentifiedPoint, Plan, PlanStep, SignalGuard, StepMarker};
+use mapper_core::{Channel, IdentifiedPoint, Plan, PlanStep, SignalGuard, StepMarker, valve_area_text};
 use mapper_report::Display;
 use mapper_report::page::{LiveMap, LivePoint, Planned, live_map, live_point, planned, target_line_name};
 use mapper_session::{Operator, SessionEvent, soak_s};
@@ -340,9 +340,12 @@ impl Feed {
             current.after_s = current.state.duration_s - current.soak_s - forecast.start_s - forecast.dwell_s;
         }
         let place = marker.to.map(|to| {
-            let (_, opening) = to.shown();
             let line = target_line_name(to.speed_rpm, &self.campaign, &self.display);
-            format!("{line} {}, opening {opening}", self.display.units().speed)
+            format!(
+                "{line} {}, valve area {}",
+                self.display.units().speed,
+                valve_area_text(to.valve_opening_ratio)
+            )
         });
         current.state.now.phase = "step".to_owned();
         current.state.now.step = Some(Step {

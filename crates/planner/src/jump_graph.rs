@@ -38,7 +38,7 @@ pub enum Rejection {
     )]
     Arrival { needed_s: f64, available_s: f64 },
     #[error(
-        "the shaft is within the speeds to avoid, {} to {} krpm, for {:.1} s; at most {:.1} s are allowed",
+        "the shaft is within the speeds to avoid, {:.2} to {:.2} krpm, for {:.1} s; at most {:.1} s are allowed",
         .0.range.from_rpm / 1e3, .0.range.to_rpm / 1e3, .0.inside_s, .0.range.longest_s
     )]
     Avoided(AvoidedCrossing),

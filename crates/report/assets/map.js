@@ -6,7 +6,7 @@ const small = () => "print" in root.dataset ? 8.5 : 10;
 
 function words(p) {
   const lines = [
-    `step ${p.name}: ${p.line} ${page.units.speed}` + (p.valve == null ? "" : `, opening ${shown(p.valve, 3)}`),
+    `step ${p.name}: ${p.line} ${page.units.speed}` + (p.valve == null ? "" : `, valve area ${shown(100 * p.valve, 1)} %`),
     `flow ${shown(p.flow, 2)} ± ${shown(p.flow_half, 2)} ${page.units.flow}`,
     `pressure ratio ${shown(p.pr, 4)} ± ${shown(p.pr_half, 4)}`,
     p.eta == null ? "efficiency not known" : `efficiency ${withMargins(p.eta, p.eta_low, p.eta_high, 2)} %`,

@@ -12,7 +12,7 @@ function stepWords(step, p) {
   const both = p.eta_common == null ? "" : `; of it common to all points ± ${shown(p.eta_common, 2)}, its own ± ${shown(p.eta_own, 2)}`;
   const fits = step.fits.map(fit => `${fit.channel} ${shown(fit.rms_k, 3)} K`).join(", ");
   return [
-    `Step ${p.name}, ${p.verdict}: ${p.line} ${page.units.speed} corrected` + (p.valve == null ? "" : `, opening ${shown(p.valve, 3)}`),
+    `Step ${p.name}, ${p.verdict}: ${p.line} ${page.units.speed} corrected` + (p.valve == null ? "" : `, valve area ${shown(100 * p.valve, 1)} %`),
     (p.eta == null ? "efficiency not known" : `efficiency ${withMargins(p.eta, p.eta_low, p.eta_high, 2)} %${both}`) +
       (p.dynamic ? `; by the dynamic method ${shown(p.dynamic[0], 2)} %` : ""),
     `corrected flow ${shown(p.flow, 2)} ± ${shown(p.flow_half, 2)} ${page.units.flow}, pressure ratio ${shown(p.pr, 4)} ± ${shown(p.pr_half, 4)}` +

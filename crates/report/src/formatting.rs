@@ -4,7 +4,8 @@
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_campaign::units::Kind;
 use mapper_core::{
-    Channel, Margins, ModelDoubt, OperatingPoint, PlanRemark, ResultRemark, Warning, with_sentences,
+    Channel, Margins, ModelDoubt, OperatingPoint, PlanRemark, ResultRemark, Warning, valve_area_text,
+    with_sentences,
 };
 use mapper_diagnose::gap::GapWarning;
 use mapper_numerics::statistics::range;
@@ -140,14 +141,15 @@ impl Display {
         text.parse::<f64>().map_or(text, |speed| speed.to_string())
     }
 
-    /// An operating point in words: speed with its unit, opening.
+    /// An operating point in words: speed with its unit, valve area.
     pub fn place_in_words(&self, point: OperatingPoint) -> String {
-        format!("{} {}, opening {}", self.speed(point.speed_rpm), self.units.speed, point.shown().1)
+        let valve = valve_area_text(point.valve_opening_ratio);
+        format!("{} {}, valve area {valve}", self.speed(point.speed_rpm), self.units.speed)
     }
 
-    /// An operating point: speed and opening.
+    /// An operating point: speed and valve area.
     pub fn place(&self, point: OperatingPoint) -> String {
-        format!("{} @ {}", self.speed(point.speed_rpm), point.shown().1)
+        format!("{} @ {}", self.speed(point.speed_rpm), valve_area_text(point.valve_opening_ratio))
     }
 
     /// Column head: name, and the unit of pressures.

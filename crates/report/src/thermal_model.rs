@@ -206,6 +206,7 @@ impl ThermalExport<'_> {
                 "capacity_at_k": CAPACITY_AT_K,
                 "housing_to_bearing_conductance_w_k": bearing_conductance_w_k(&params.bearing),
                 "bearing_to_oil_conductance_w_k": params.bearing.oil_conductance_w_k,
+                "friction_heat_at_100_krpm_w": params.bearing.friction_heat_w,
                 "t2_probe_diameter_m": params.t2_probe_diameter_m,
             },
         });

@@ -5,7 +5,7 @@ use crate::step_source::{StepSource, StepSourceError};
 use crate::surge::{LineEnd, Move, SurgeEstimate, SurgeReading, choose_next_move};
 use mapper_core::{
     Channel, EventKind, OperatingPoint, PlanStep, Predicted, Recording, ReferenceState, SampleBatch,
-    StepKind, StepMarker, SurgeSearchSettings,
+    StepKind, StepMarker, SurgeSearchSettings, valve_area_text,
 };
 
 /// Time at the end of a line before the first reading, s: the machine comes from elsewhere on the map.
@@ -229,9 +229,9 @@ impl Approach {
             _ if self.has_surged => (
                 Stage::Return,
                 Some(format!(
-                    "{}: surge at opening {:.3}, the valve opens",
+                    "{}: surge at valve area {}, the valve opens",
                     line(),
-                    marker.valve_opening_ratio
+                    valve_area_text(marker.valve_opening_ratio)
                 )),
             ),
             Stage::Arrive => (Stage::SurgeReading(safe), None),

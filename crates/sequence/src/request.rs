@@ -53,9 +53,8 @@ impl SequenceRequest {
     /// Solves the steady state of a point, or refuses it because it violates a limit.
     pub(crate) fn check(&self, point: OperatingPoint) -> Result<SteadyState, Refusal> {
         reach(&self.model, point, &self.boundary, self.follow_outlet, &self.limits).map_err(|obstacles| {
-            let (krpm, opening) = (point.speed_rpm / 1e3, point.valve_opening_ratio);
             Refusal {
-                message: format!("{krpm} krpm at opening {opening} {}", describe_obstacles(&obstacles)),
+                message: format!("{} {}", point.in_words(), describe_obstacles(&obstacles)),
                 remedy: obstacles.first().map_or("", |obstacle| obstacle.remedy()).to_owned(),
             }
         })

@@ -1,4 +1,37 @@
-//! Keys whose values are text: in a file, or in the options of a command.
+//! Keys whose values are text: in a file, or in the options of a command; the value `off`.
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Deserializer, de};
+use serde_json::Value;
+use std::borrow::Cow;
+
+/// The value `off`. `false` means the same: YAML 1.1 has one value for both, so PyYAML writes `false` for an `off` that it read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Off;
+
+impl<'de> Deserialize<'de> for Off {
+    fn deserialize<S: Deserializer<'de>>(deserializer: S) -> Result<Self, S::Error> {
+        match Value::deserialize(deserializer)? {
+            Value::Bool(false) => Ok(Off),
+            Value::String(word) if word == "off" => Ok(Off),
+            other => Err(de::Error::custom(format!("{other} is not `off`"))),
+        }
+    }
+}
+
+impl JsonSchema for Off {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Off".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({"type": ["string", "boolean"], "enum": ["off", false]})
+    }
+}
 
 /// Maximum number of characters of a wrong key or value in a message.
 const MAX_SHOWN: usize = 60;

@@ -159,6 +159,7 @@ const INERTIA: &[Unit] = &[
     decimal(&["g cm^2", "g cm2", "g cm²", "g*cm^2"], -7),
 ];
 const CONDUCTANCE: &[Unit] = &[decimal(&["W/K"], 0)];
+const POWER: &[Unit] = &[decimal(&["W"], 0), decimal(&["kW"], 3)];
 const CONDUCTIVITY: &[Unit] = &[decimal(&["W/(m K)", "W/(m*K)", "W/m/K", "W/(K m)"], 0)];
 const FRACTION: &[Unit] = &[decimal(&["%"], -2), decimal(&["ppm"], -6)];
 const FREQUENCY: &[Unit] = &[decimal(&["Hz", "1/s"], 0), decimal(&["kHz"], 3)];
@@ -244,6 +245,8 @@ kinds! {
     Inertia "inertia", "a moment of inertia", "16e-6 kg m^2", INERTIA;
     /// Thermal conductance; stored in W/K.
     Conductance "conductance", "a thermal conductance", "8 W/K", CONDUCTANCE;
+    /// Power; stored in W.
+    Power "power", "a power", "440 W", POWER;
     /// Thermal conductivity; stored in W/(m K).
     Conductivity "conductivity", "a thermal conductivity", "47.5 W/(m K)", CONDUCTIVITY;
     /// Share of a whole; stored as a ratio.

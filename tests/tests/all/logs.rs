@@ -298,5 +298,5 @@ fn a_converted_recording_gives_the_same_points() {
     let before = std::fs::read(&table).unwrap();
     convert(&table, 1);
     assert_eq!(std::fs::read(&table).unwrap(), before);
-    convert(&run.file("converted.xyz"), 2);
+    convert(&run.file("converted.xyz"), 3);
 }

@@ -1,6 +1,8 @@
 //! The main job: the shipped campaign, from the file to the map.
 
-use mapper_tests::{CampaignFile, SHIPPED, SharedRun, mapper, shared_run};
+use mapper_core::EventKind;
+use mapper_recording::{ReadOptions, read_marks};
+use mapper_tests::{CampaignFile, SHIPPED, SharedRun, mapper, repository, shared_run};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -50,6 +52,23 @@ fn the_shipped_campaign_gives_a_map() {
     let [again] = again.as_slice() else { panic!("{} steps lead back to the first point", again.len()) };
     assert_eq!(again["target"], points[0]["target"]);
     assert_repeats_show_drift_and_are_not_in_the_map(&result, &points, &repeats);
+}
+
+/// Sections 4 and 5 of the paper: its points lie between surge and choke at up to 150 krpm.
+#[test]
+fn the_paper_s_machine_is_mapped_without_surge_or_overspeed() {
+    let text = std::fs::read_to_string(repository().join("campaigns/turbo_paper.yaml")).unwrap();
+    let SharedRun { run, result, .. } = shared_run(&CampaignFile::of(text));
+    let (steps, events) = read_marks(&run.join("recording.mcap"), &ReadOptions::default()).unwrap();
+    let troubles: Vec<_> = events
+        .iter()
+        .filter(|event| {
+            let kinds = [EventKind::SurgeEntered, EventKind::OverspeedEntered, EventKind::GuardTripped];
+            kinds.contains(&event.kind)
+        })
+        .collect();
+    assert!(troubles.is_empty(), "{troubles:?}");
+    assert!(steps.len() > 48 && result["points"].as_array().unwrap().len() == steps.len(), "{}", steps.len());
 }
 
 /// One jump, made at least twice where the campaign says nothing else. The virtual lab does not drift: what changes from

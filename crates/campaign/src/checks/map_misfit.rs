@@ -159,11 +159,9 @@ pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<Unreachable
     let check_point = |(index, point): (usize, &OperatingPoint)| {
         let (boundary, limits) = (&campaign.boundary, &campaign.limits);
         let obstacles = reach(model, *point, boundary, campaign.follow_outlet, limits).err()?;
-        let (krpm, opening) = point.shown();
-        let krpm = (krpm * 1e2).round() / 1e2;
         Some(UnreachablePoint {
             point: index,
-            reason: format!("{krpm} krpm at opening {opening} {}", describe_obstacles(&obstacles)),
+            reason: format!("{} {}", point.in_words(), describe_obstacles(&obstacles)),
             remedy: obstacles.first()?.remedy().to_owned(),
             limit: obstacles.first()?.limit(),
         })

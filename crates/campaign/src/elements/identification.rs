@@ -11,10 +11,10 @@ use serde::{Deserialize, Serialize};
 element! {
     /// Variations over the window within which a point counts as settled.
     pub(crate) SettleBandsElement for SettleBands {
-        /// Shaft speed; 0.8 % if none is given.
-        speed => speed_ratio: Quantity<Fraction> [extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.8 %"];
-        /// Compressor flow; 1.5 % if none is given.
-        flow => flow_ratio: Quantity<Fraction> [extend("x-above" = "0 %", "x-max" = "100 %"), example = &"1.5 %"];
+        /// Shaft speed; 1.5 % if none is given.
+        speed => speed_ratio: Quantity<Fraction> [extend("x-above" = "0 %", "x-max" = "100 %"), example = &"1.5 %"];
+        /// Compressor flow; 0.8 % if none is given.
+        flow => flow_ratio: Quantity<Fraction> [extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.8 %"];
         /// Pressure ratio; 2 % if none is given.
         pressure_ratio => pressure_ratio_ratio: Quantity<Fraction> [extend("x-above" = "0 %", "x-max" = "100 %"), example = &"2 %"];
     }

@@ -106,6 +106,10 @@ pub struct Report {
     pub operator: Option<String>,
     /// Test cell.
     pub test_cell: Option<String>,
+    /// What a report states about the stand (SAE J1826), by name: oil grade, pressure and flow, cooling water, insulation, positions of the taps.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schemars(extend("maxProperties" = 24), example = serde_json::json!({"oil": "SAE 5W-30, 3 bar, 2 L/min", "cooling water": "none", "insulation": "none"}))]
+    pub stand: BTreeMap<String, String>,
     /// Day of the last calibration of each sensor, by its symbol, e.g. `T2: 2026-09-01`: the short form of `calibration` at the sensor.
     #[serde(default)]
     #[schemars(with = "BTreeMap<SensorSymbol, Date>")]

@@ -5,6 +5,7 @@ use crate::elements::grid::PointFile;
 use crate::si_values::element;
 use crate::units::{Duration, Fraction, Kind, Quantity};
 use mapper_core::{Jump, Repeats, SurgeSearchSettings};
+use mapper_yaml::keys::Off;
 use mapper_yaml::{FindingKind, steps};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,14 +19,8 @@ const DEFAULT_COUNT: usize = 2;
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum RepeatsFile {
-    Named(NamedRepeats),
+    Off(Off),
     Jump(RepeatedJumpFile),
-}
-
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum NamedRepeats {
-    Off,
 }
 
 /// A jump that is repeated.
@@ -56,7 +51,7 @@ pub(crate) struct JumpFile {
 pub(crate) fn repeats(file: Option<RepeatsFile>) -> Option<Repeats> {
     let file = match file {
         Some(RepeatsFile::Jump(file)) => file,
-        Some(RepeatsFile::Named(NamedRepeats::Off)) => return None,
+        Some(RepeatsFile::Off(Off)) => return None,
         None => RepeatedJumpFile::default(),
     };
     Some(Repeats {

@@ -7,8 +7,9 @@ use mapper_validation::reproduction::{FIGURES, picture_path};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Reproduce the paper's figures 5 to 10 and 12 on the nominal model and compare with what the paper states
+/// Reproduce the paper's figures on the nominal model and compare with what the paper states
 #[derive(Debug, Args)]
+#[command(about = about())]
 pub struct Reproduce {
     /// Directory for `reproduction.md` and the pictures; files of an earlier reproduction there are replaced
     #[arg(long, value_name = "DIR", default_value = "reproduction")]
@@ -16,6 +17,13 @@ pub struct Reproduce {
     /// Print the paper's statements and the results here as one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+}
+
+fn about() -> String {
+    let figures = FIGURES.join(", ");
+    format!(
+        "Reproduce the paper's figures {figures} on the nominal model and compare with what the paper states"
+    )
 }
 
 impl Reproduce {
@@ -44,7 +52,7 @@ impl Reproduce {
             text.push_str(&format!("Figure {}: {}\n", result.number, result.title));
             for statement in &result.statements {
                 text.push_str(&format!(
-                    "  {:8} {}\n           {}\n",
+                    "  {:11} {}\n              {}\n",
                     statement.verdict.to_string(),
                     statement.paper,
                     statement.here

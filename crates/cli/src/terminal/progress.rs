@@ -258,12 +258,9 @@ impl ProgressDisplay {
     }
 }
 
-/// Target of a step, to a tenth of a krpm and a thousandth of the opening: 110 krpm, opening 0.7.
+/// Target of a step.
 fn place(marker: &StepMarker) -> String {
-    let shown = |(krpm, opening): (f64, f64)| {
-        format!("{} krpm, opening {}", (krpm * 1e1).round() / 1e1, (opening * 1e3).round() / 1e3)
-    };
-    marker.to.map_or_else(String::new, |point| shown(point.shown()))
+    marker.to.map_or_else(String::new, |point| point.in_words())
 }
 
 fn event_line(t_s: f64, message: &str) -> String {

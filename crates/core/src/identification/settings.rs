@@ -245,10 +245,15 @@ pub struct SettleBands {
     pub pressure_ratio_ratio: f64,
 }
 
+impl SettleBands {
+    /// Source: the typical variations in section 3 of Burke et al.: 0.8 % in flow, 2 % in pressure ratio, 1.5 % in speed.
+    pub const PAPER: SettleBands =
+        SettleBands { speed_ratio: 0.015, flow_ratio: 0.008, pressure_ratio_ratio: 0.02 };
+}
+
 impl Default for SettleBands {
-    /// Source: the typical variations in section 3 of Burke et al.: 0.8 % in speed, 1.5 % in flow, 2 % in pressure ratio.
     fn default() -> Self {
-        SettleBands { speed_ratio: 0.008, flow_ratio: 0.015, pressure_ratio_ratio: 0.02 }
+        SettleBands::PAPER
     }
 }
 

@@ -46,6 +46,14 @@ pub struct OperatingPoint {
     pub valve_opening_ratio: f64,
 }
 
+/// A valve opening for display, in per cent of the valve's nominal area, to a tenth: valves are set to a thousandth at best. `-` if it is unknown.
+pub fn valve_area_text(opening_ratio: f64) -> String {
+    match opening_ratio.is_finite() {
+        true => format!("{} %", (1e3 * opening_ratio).round() / 10.0),
+        false => "-".to_owned(),
+    }
+}
+
 impl OperatingPoint {
     /// Largest setpoint of a back-pressure valve's opening, relative to its nominal area. Bound: a machine chokes before.
     pub const OPENING_MAX_RATIO: f64 = 2.5;
@@ -56,6 +64,12 @@ impl OperatingPoint {
             (self.speed_rpm * SHOWN_PER_RPM).round() / (SHOWN_PER_RPM * RPM_PER_KRPM),
             (self.valve_opening_ratio * SHOWN_PER_RATIO).round() / SHOWN_PER_RATIO,
         )
+    }
+
+    /// Speed to 0.01 krpm and valve area for display: `110 krpm, valve area 70 %`.
+    pub fn in_words(&self) -> String {
+        let valve = valve_area_text(self.valve_opening_ratio);
+        format!("{} krpm, valve area {valve}", (self.speed_rpm / 10.0).round() / 100.0)
     }
 
     /// Whether two points are the same on any rig: speeds within 1e-3 rpm, openings within 1e-6.

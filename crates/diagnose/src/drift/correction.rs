@@ -6,7 +6,7 @@ use crate::drift::refinement::{FittedDrift, Refinement};
 use crate::drift::report::{CorrectedPoint, DriftReport, FoundDrift, RepeatGroup, Visit, VisitChannel};
 use crate::drift::runs::{CampaignStep, DriftRequest, mean_variance_ratio};
 use mapper_core::unit_factors::{PA_PER_KPA, RPM_PER_KRPM};
-use mapper_core::{Channel, IdentifiedPoint, Recording};
+use mapper_core::{Channel, IdentifiedPoint, Recording, valve_area_text};
 use mapper_identify::identify_each;
 use mapper_observe::averages::{OUTPUTS, mean_between};
 use nalgebra::DVector;
@@ -151,8 +151,8 @@ pub(crate) fn group(
             let speed = speed(step)
                 .map_or_else(|| "-".to_owned(), |speed_rpm| format!("{:.1}", speed_rpm / RPM_PER_KRPM));
             format!(
-                "{speed} krpm at opening {} (P3 {:.1} kPa)",
-                step.valve_opening_ratio,
+                "{speed} krpm, valve area {} (P3 {:.1} kPa)",
+                valve_area_text(step.valve_opening_ratio),
                 step.p3_pa / PA_PER_KPA
             )
         })

@@ -128,6 +128,7 @@ fn row(expected: &ForecastRow, config: &IdentifyConfig) -> Row {
         tt_k: f64::NAN,
         oil_k: f64::NAN,
         ambient_k: f64::NAN,
+        speed_rpm: expected.speed_rpm,
         place: place(config, expected.speed_rpm, expected.flow_kg_s, expected.t1_k, expected.p1_pa),
     }
 }

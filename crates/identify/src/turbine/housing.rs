@@ -13,8 +13,9 @@ use mapper_numerics::statistics::{mean, robust_sigma};
 use mapper_physics::gas::air::viscosity_pa_s;
 use mapper_physics::laws::convection::coefficient_w_m2k;
 use mapper_physics::laws::housing::{
-    bearing_conductance_w_k, bearing_k, external_heat_w, turbine_capacity_of_mass_j_k,
+    bearing_conductance_w_k, bearing_k, external_heat_w, friction_heat_w, turbine_capacity_of_mass_j_k,
 };
+use mapper_physics::machine::params::rad_s_of_rpm;
 use nalgebra::{DMatrix, DVector};
 
 /// Length of a block, s. Bound: several seconds, in which the rate of Tt stands above its noise, and at most a quarter of a short dwell.
@@ -49,6 +50,8 @@ pub(crate) struct HousingState {
     /// NaN if it is not measured.
     pub(crate) oil_k: f64,
     pub(crate) ambient_k: f64,
+    /// NaN if it is not measured.
+    pub(crate) speed_rpm: f64,
 }
 
 /// A block of a step.
@@ -177,7 +180,9 @@ impl<'a> HousingBalance<'a> {
         let tc_k = if state.tc_k.is_finite() { state.tc_k } else { state.ambient_k };
         let (oil_w_k, oil_k) =
             if state.oil_k.is_finite() { (bearing.oil_conductance_w_k, state.oil_k) } else { (0.0, tc_k) };
-        let node_k = bearing_k(conductance_w_k, oil_w_k, tc_k, state.tt_k, oil_k);
+        let known = state.oil_k.is_finite() && state.speed_rpm.is_finite();
+        let friction_w = if known { friction_heat_w(bearing, rad_s_of_rpm(state.speed_rpm)) } else { 0.0 };
+        let node_k = bearing_k(conductance_w_k, oil_w_k, friction_w, tc_k, state.tt_k, oil_k);
         external_w * (SIGMAS[3] * unknowns[3]).exp()
             + conductance_w_k * (state.tt_k - node_k) * (SIGMAS[4] * unknowns[4]).exp()
     }
@@ -263,6 +268,7 @@ pub(crate) fn housing_state(recording: &Recording, span_s: (f64, f64)) -> Option
         tc_k: or_nan(Channel::Tc),
         oil_k: or_nan(Channel::TOil),
         ambient_k: level(Channel::TAmb).or_else(|| level(Channel::T1))?,
+        speed_rpm: or_nan(Channel::ShaftSpeed),
     })
 }
 

@@ -1,7 +1,7 @@
 //! Heat balances of the housings, in operation and at rest.
 
 use crate::laws::housing;
-use crate::machine::params::{BearingParams, Params};
+use crate::machine::params::{BearingParams, FRICTION_SPEED_RPM, Params, rad_s_of_rpm};
 
 /// Stefan-Boltzmann constant, W/(m2 K4).
 pub const STEFAN_BOLTZMANN_W_M2K4: f64 = 5.670_374_419e-8;
@@ -14,16 +14,23 @@ pub fn bearing_conductance_w_k(bearing: &BearingParams) -> f64 {
     2.0 * bearing.conductivity_w_mk * bearing.section_area_m2 / bearing.length_m
 }
 
-/// Temperature of the massless bearing node between both housings and the oil, K.
+/// Heat of viscous friction (Petroff) to the bearing housing, W.
+#[inline]
+pub fn friction_heat_w(bearing: &BearingParams, shaft_speed_rad_s: f64) -> f64 {
+    bearing.friction_heat_w * (shaft_speed_rad_s / rad_s_of_rpm(FRICTION_SPEED_RPM)).powi(2)
+}
+
+/// Temperature of the massless bearing node between both housings and the oil, with the heat of friction, K.
 #[inline]
 pub fn bearing_k(
     bearing_conductance_w_k: f64,
     oil_conductance_w_k: f64,
+    friction_w: f64,
     tc_k: f64,
     tt_k: f64,
     oil_k: f64,
 ) -> f64 {
-    (bearing_conductance_w_k * (tt_k + tc_k) + oil_conductance_w_k * oil_k)
+    (bearing_conductance_w_k * (tt_k + tc_k) + oil_conductance_w_k * oil_k + friction_w)
         / (2.0 * bearing_conductance_w_k + oil_conductance_w_k)
 }
 
@@ -117,7 +124,8 @@ pub fn relax(
 fn rates_k_s(params: &Params, tc_k: f64, tt_k: f64, oil_k: f64, ambient_k: f64) -> [f64; 2] {
     let (compressor, turbine) = (&params.compressor, &params.turbine);
     let bearing_w_k = housing::bearing_conductance_w_k(&params.bearing);
-    let bearing_k = housing::bearing_k(bearing_w_k, params.bearing.oil_conductance_w_k, tc_k, tt_k, oil_k);
+    let bearing_k =
+        housing::bearing_k(bearing_w_k, params.bearing.oil_conductance_w_k, 0.0, tc_k, tt_k, oil_k);
     let external_w = |area_m2, emissivity_ratio, wall_k| {
         let convection_ratio = params.external_convection_ratio;
         housing::external_heat_w(area_m2, emissivity_ratio, convection_ratio, wall_k, ambient_k)
@@ -155,8 +163,12 @@ mod tests {
     fn the_bearing_housing_is_a_chain_of_conductances() {
         let params = Params::default();
         assert!((bearing_conductance_w_k(&params.bearing) - 1.4778).abs() < 1e-4);
-        assert!((bearing_k(1.5, 0.0, 340.0, 500.0, 320.0) - 420.0).abs() < 1e-12);
-        assert!((bearing_k(1.5, 1.5, 340.0, 500.0, 330.0) - 390.0).abs() < 1e-12);
+        assert!((bearing_k(1.5, 0.0, 0.0, 340.0, 500.0, 320.0) - 420.0).abs() < 1e-12);
+        assert!((bearing_k(1.5, 1.5, 0.0, 340.0, 500.0, 330.0) - 390.0).abs() < 1e-12);
+        // 180 W at 100 krpm are 45 W at half the speed: 10 K through 4.5 W/K.
+        let bearing = BearingParams { friction_heat_w: 180.0, ..params.bearing };
+        let friction_w = friction_heat_w(&bearing, rad_s_of_rpm(50e3));
+        assert!((bearing_k(1.5, 1.5, friction_w, 340.0, 500.0, 330.0) - 400.0).abs() < 1e-9);
         assert!((compressor_capacity_j_k(&params, 300.0) - 0.93 * 930.0).abs() < 1e-9);
         assert!((turbine_capacity_j_k(&params, 800.0) - 3.15 * 700.0).abs() < 1e-9);
     }

@@ -213,7 +213,14 @@ pub struct BearingParams {
     pub length_m: f64,
     /// Conductance from the bearing housing to the oil, W/K.
     pub oil_conductance_w_k: f64,
+    /// Heat of bearing friction to the bearing housing at [`FRICTION_SPEED_RPM`], W, >= 0; it rises with the square of the speed. The power
+    /// it takes from the shaft is part of the turbine's efficiency. Appendix A has none.
+    #[serde(default)]
+    pub friction_heat_w: f64,
 }
+
+/// Shaft speed to which the friction heat of a bearing refers, rpm. Source: definition.
+pub const FRICTION_SPEED_RPM: f64 = 100e3;
 
 /// Back-pressure valve and the volume between compressor and valve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -289,6 +296,7 @@ impl Default for Params {
                 section_area_m2: 7e-4,
                 length_m: 45e-3,
                 oil_conductance_w_k: 8.0,
+                friction_heat_w: 0.0,
             },
             shaft_inertia_kgm2: 16e-6,
             outlet: OutletParams { volume_m3: 0.78e-3, valve_area_m2: 0.4e-3, discharge_coefficient: 0.6 },

@@ -70,10 +70,10 @@ pub enum Obstacle {
     Opening { highest_ratio: f64 },
     #[error("cannot be held: {0}")]
     NoSteadyState(#[source] SteadyError),
-    #[error("is above the speed limit, `limits.speed` = {} krpm", .limit_rpm / 1e3)]
+    #[error("is above the speed limit, `limits.speed` = {:.2} krpm", .limit_rpm / 1e3)]
     Speed { limit_rpm: f64 },
     #[error(
-        "is within the speeds to avoid, `limits.avoid` from {} to {} krpm; allowed next to them: {}", .range.from_rpm / 1e3,
+        "is within the speeds to avoid, `limits.avoid` from {:.2} to {:.2} krpm; allowed next to them: {}", .range.from_rpm / 1e3,
         .range.to_rpm / 1e3, .nearest_rpm.iter().map(|rpm| readable(*rpm, "rpm")).collect::<Vec<_>>().join(" and ")
     )]
     Avoided { range: AvoidedRange, nearest_rpm: Vec<f64> },

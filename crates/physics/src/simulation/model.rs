@@ -158,6 +158,7 @@ impl PreparedModel<'_> {
         let bearing_k = housing::bearing_k(
             self.bearing_conductance_w_k,
             params.bearing.oil_conductance_w_k,
+            housing::friction_heat_w(&params.bearing, state.shaft_speed_rad_s),
             state.tc_k,
             state.tt_k,
             boundary.oil_temperature_k,

@@ -4,7 +4,7 @@ use crate::document::{Cell, Document, Table};
 use crate::formatting::{Message, display_scale};
 use mapper_chart::palette::{self, Colour};
 use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
-use mapper_core::{Channel, probability_text, step_number};
+use mapper_core::{Channel, probability_text, step_number, valve_area_text};
 use mapper_diagnose::gap::{Diagnosis, Evidence, GapWarning, Kind, Next, OffsetAtRest, Study, Suggestion};
 use mapper_numerics::statistics::{mean, rms};
 
@@ -58,29 +58,23 @@ pub(crate) fn next_section(diagnosis: &Diagnosis) -> Document {
 /// The action, in words.
 pub(crate) fn name_experiment(experiment: &Suggestion) -> String {
     let Suggestion { from, to, .. } = experiment;
-    let at = format!("at {:.0} krpm and opening {}", to.speed_rpm / 1e3, to.valve);
+    let (from_valve, to_valve) = (valve_area_text(from.valve), valve_area_text(to.valve));
+    let at = format!("at {:.0} krpm and valve area {to_valve}", to.speed_rpm / 1e3);
     let celsius = |change: Option<[f64; 2]>| {
         let [before_k, after_k] = change.unwrap_or([f64::NAN; 2]);
         format!("from {:.0} to {:.0} degC {at}", before_k - ZERO_C_K, after_k - ZERO_C_K)
     };
     let jump = || {
         format!(
-            "jump from {:.0} krpm at opening {} to {:.0} krpm at {}",
+            "jump from {:.0} krpm at valve area {from_valve} to {:.0} krpm at {to_valve}",
             from.speed_rpm / 1e3,
-            from.valve,
             to.speed_rpm / 1e3,
-            to.valve
         )
     };
     match experiment.kind {
         Kind::Jump => jump(),
         Kind::ValveStep => {
-            format!(
-                "valve step from opening {} to {} at {:.0} krpm",
-                from.valve,
-                to.valve,
-                to.speed_rpm / 1e3
-            )
+            format!("valve step from area {from_valve} to {to_valve} at {:.0} krpm", to.speed_rpm / 1e3)
         }
         Kind::T3Step => format!("turbine inlet {}", celsius(experiment.t3_k)),
         Kind::OilStep => format!("oil {}", celsius(experiment.oil_temperature_k)),

@@ -1,9 +1,9 @@
 //! The parts of a report that work only in a browser: map, transient of a point, and plan.
 
 use crate::formatting::Display;
-use crate::point_results::points::{opening, step_name};
+use crate::point_results::points::step_name;
 use crate::point_results::summary::PointResults;
-use mapper_core::{CompressorMap, Verdict, step_number};
+use mapper_core::{CompressorMap, Verdict, step_number, valve_area_text};
 use maud::{Markup, html};
 
 /// Another run's map.
@@ -83,7 +83,7 @@ pub(crate) fn step_widget(results: &PointResults<'_>, display: &Display) -> Mark
                 @for point in results.identified() {
                     option value=(step_number(point.step)) {
                         (step_name(point)) " · " (display.speed(point.speed_rpm)) " " (display.units().speed)
-                        @if point.valve_opening_ratio.is_finite() { " · opening " (opening(point.valve_opening_ratio)) }
+                        @if point.valve_opening_ratio.is_finite() { " · valve area " (valve_area_text(point.valve_opening_ratio)) }
                     }
                 }
             }

@@ -7,7 +7,7 @@ use crate::test_report::zero_and_sensors::declared_sensors;
 use mapper_campaign::{Campaign, ResolvedLine, ResolvedPoint};
 use mapper_core::{
     Advice, CampaignChange, Channel, PlanRemark, UndeclaredForecast, VerdictForecast, half_width_95,
-    with_unit,
+    valve_area_text, with_unit,
 };
 use mapper_observe::{Fitted, MeasuredValue};
 use serde_json::{Value, json};
@@ -100,15 +100,13 @@ fn add_forecast(document: &mut Document, campaign: &Campaign, forecast: &Verdict
 
 /// The other outcome of a forecast near the limit: all points depend on it together, so a range from 0 would say less.
 fn describe_near_limit(forecast: &VerdictForecast) -> String {
-    let steps = "these steps determine alpha_A, probe and heating/cooling ratio a little";
+    let reason = "depends on how well the steps determine alpha_A, probe and heating/cooling ratio";
     match forecast.good {
         0 => format!(
-            "Near a limit: if {steps} better than forecast, up to {} points are good; otherwise all are doubtful (`prior_dominated`).",
+            "Near a limit: all points are probably doubtful (`prior_dominated`), at best {} are good. It {reason}.",
             forecast.good_high
         ),
-        _ => format!(
-            "Near a limit: if {steps} worse than forecast, all points are doubtful (`prior_dominated`)."
-        ),
+        _ => format!("Near a limit: all points may become doubtful (`prior_dominated`). It {reason}."),
     }
 }
 
@@ -141,7 +139,7 @@ fn add_lines(document: &mut Document, campaign: &Campaign, lines: &[ResolvedLine
         "points".to_owned(),
         display.flow_head("corrected flow"),
         "PR".to_owned(),
-        "opening".to_owned(),
+        "valve area".to_owned(),
         "surge margin %".to_owned(),
     ]);
     for line in lines {
@@ -153,7 +151,7 @@ fn add_lines(document: &mut Document, campaign: &Campaign, lines: &[ResolvedLine
             line.points.len().to_string(),
             range(&|point| display.flow(point.flow_corrected_kg_s)),
             range(&|point| format!("{:.3}", point.pressure_ratio)),
-            range(&|point| format!("{:.3}", point.valve_opening_ratio)),
+            range(&|point| valve_area_text(point.valve_opening_ratio)),
             percent(Some(last.surge_margin_ratio), 0),
         ]);
     }

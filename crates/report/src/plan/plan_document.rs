@@ -6,7 +6,7 @@ use mapper_campaign::Campaign;
 use mapper_chart::{Annotation, Axis, Colour, Figure, Line, Panel, PointLabels, Scatter};
 use mapper_core::{
     AvoidedCrossing, OperatingPoint, Plan, PlanStep, Recording, StepKind, Transition, WindowRule,
-    standard_error_of, step_number,
+    standard_error_of, step_number, valve_area_text,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
@@ -38,7 +38,7 @@ pub fn plan_document(campaign: &Campaign, plan: &Plan) -> Document {
         steps.row([
             format!("{}{}", step_number(step.index), mark(step.kind)),
             display.speed(step.to.speed_rpm),
-            step.to.shown().1.to_string(),
+            valve_area_text(step.to.valve_opening_ratio),
             display.pressure(step.p3_pa),
             display.flow(predicted.flow_kg_s),
             format!("{:.3}", predicted.pressure_ratio),
@@ -70,7 +70,7 @@ fn mark(kind: StepKind) -> &'static str {
 fn marks_legend(kinds: &[StepKind]) -> String {
     let marks = [
         (StepKind::Repeat, "r visits a point again, to show drift or to lead around a forbidden jump"),
-        (StepKind::Return, "a visits the first point again"),
+        (StepKind::Return, "a returns to the first point"),
         (StepKind::Approach, "s approaches surge"),
     ];
     let marked: Vec<&str> =
@@ -81,7 +81,7 @@ fn marks_legend(kinds: &[StepKind]) -> String {
 fn legend(plan: &Plan) -> String {
     let marked = marks_legend(&plan.steps.iter().map(|step| step.kind).collect::<Vec<_>>());
     format!(
-        "{marked}valve: opening of the back-pressure valve. P3: turbine inlet pressure. m_c, PR, T2: at the end of the step. dTc: change of the compressor \
+        "{marked}valve: area of the back-pressure valve, per cent of its nominal area. P3: turbine inlet pressure. m_c, PR, T2: at the end of the step. dTc: change of the compressor \
          housing's temperature in the window, the thermal gradient. +/-: expected error of the efficiency, points, one sigma. settles: after the jump. ends: after \
          the start of the run."
     )
@@ -269,7 +269,7 @@ pub fn jump_forecast(campaign: &Campaign, jump: &JumpForecast) -> Document {
     // A method that identifies all steps together has no error of a single jump.
     let points = |error: Option<f64>| {
         error.map_or_else(
-            || "not of one jump alone".to_owned(),
+            || "known only for all steps together".to_owned(),
             |error| format!("{} points", percent(Some(error), 2)),
         )
     };
@@ -319,8 +319,8 @@ pub(crate) fn executed_plan_table(
 ) -> Table {
     let mut table = Table::new([
         "step".to_owned(),
-        display.speed_head("from @ opening,"),
-        display.speed_head("to @ opening,"),
+        display.speed_head("from @ valve area,"),
+        display.speed_head("to @ valve area,"),
         display.speed_head("N reached"),
         "lasted s".to_owned(),
         "planned s".to_owned(),

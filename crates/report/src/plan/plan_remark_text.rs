@@ -4,15 +4,15 @@ use crate::formatting::Message;
 use mapper_core::{Channel, OperatingPoint, PlanRemark, with_unit};
 use std::collections::BTreeMap;
 
-fn place(point: &OperatingPoint) -> String {
-    format!("{:.1} krpm at opening {:.3}", 1e-3 * point.speed_rpm, point.valve_opening_ratio)
-}
-
 impl Message for PlanRemark {
     fn message(&self) -> String {
         match self {
             PlanRemark::RepeatedJump { from, to, times } => {
-                format!("the jump from {} to {} is made {times} times to show drift", place(from), place(to))
+                format!(
+                    "the jump from {} to {} is made {times} times to show drift",
+                    from.in_words(),
+                    to.in_words()
+                )
             }
             PlanRemark::NoRepeatedJump => {
                 "no jump between the points can be repeated, so that drift would not show".to_owned()
@@ -20,13 +20,13 @@ impl Message for PlanRemark {
             PlanRemark::AppendedJump { from, to } => {
                 format!(
                     "the jump from {} to {} is made after all others, and is not a point of the map",
-                    place(from),
-                    place(to)
+                    from.in_words(),
+                    to.in_words()
                 )
             }
             PlanRemark::WayAround { from, to, over } => {
-                let over: Vec<String> = over.iter().map(place).collect();
-                let (from, to) = (place(from), place(to));
+                let over: Vec<String> = over.iter().map(OperatingPoint::in_words).collect();
+                let (from, to) = (from.in_words(), to.in_words());
                 format!(
                     "a limit forbids the jump from {from} to {to}; the plan leads over {}",
                     over.join(", ")
@@ -35,11 +35,14 @@ impl Message for PlanRemark {
             PlanRemark::FirstPointAgain { point } => {
                 format!(
                     "the first point, {}, is visited again at the end: no jump led to it at the start",
-                    place(point)
+                    point.in_words()
                 )
             }
             PlanRemark::FirstPointWithoutJump { point } => {
-                format!("no jump leads to the first point, {}: it has no transient to identify", place(point))
+                format!(
+                    "no jump leads to the first point, {}: it has no transient to identify",
+                    point.in_words()
+                )
             }
             PlanRemark::NoWayBack => "a limit forbids the way back to the first point at the end".to_owned(),
             PlanRemark::PriorDominated { eta_error, max_eta_error } => format!(
@@ -103,7 +106,7 @@ pub fn guard_trip_text(remark: &PlanRemark) -> (String, String) {
     };
     let trip = format!(
         "the guard `{guard}` will probably end the run in the step to {}: in a rehearsal on the nominal machine, {reason}",
-        place(to)
+        to.in_words()
     );
     let remedy = match highest_speed_rpm {
         Some(rpm) => format!(

@@ -5,3 +5,4 @@ pub(crate) mod point_warnings;
 pub(crate) mod points;
 pub(crate) mod summary;
 pub(crate) mod warning_text;
+pub(crate) mod wheel_table;

@@ -6,7 +6,7 @@ use crate::formatting::{Display, number, percent};
 use Column as C;
 use mapper_core::{
     Channel, CompressorMap, IdentifiedPoint, Recording, SpeedLine, StepKind, StepMarker, Verdict, Warning,
-    half_width_95, step_number,
+    half_width_95, step_number, valve_area_text,
 };
 use mapper_identify::DynamicEfficiency;
 use mapper_numerics::statistics::{mean, median};
@@ -85,7 +85,7 @@ impl Column {
             C::Step => "step".to_owned(),
             C::Speed => display.speed_head("N"),
             C::SpeedCorrected => display.speed_head("N corr."),
-            C::Opening => "opening".to_owned(),
+            C::Opening => "valve area".to_owned(),
             C::Flow => display.flow_head("flow corr."),
             C::FlowMargin | C::PressureRatioMargin | C::EtaMargin | C::HMargin => "+/-".to_owned(),
             C::PressureRatio => "PR".to_owned(),
@@ -114,7 +114,7 @@ impl Column {
             C::Step => Cell::number(step_name(point), point.step as f64),
             C::Speed => Cell::optional(Some(point.speed_rpm), |rpm| display.speed(rpm)),
             C::SpeedCorrected => Cell::optional(Some(point.speed_corrected_rpm), |rpm| display.speed(rpm)),
-            C::Opening => Cell::optional(Some(point.valve_opening_ratio), opening),
+            C::Opening => Cell::optional(Some(point.valve_opening_ratio), valve_area_text),
             C::Flow => Cell::optional(Some(point.flow_corrected_kg_s), flow),
             C::FlowMargin => {
                 let half_ratio = half_width_95(point.common.flow_corrected_standard_error_ratio);
@@ -210,7 +210,7 @@ pub(crate) fn points_by_line(
     let units = display.units();
     let with_truth = with_truth(points, truth);
     let mut heads: Vec<&str> =
-        vec![&units.speed, "step", "opening", &units.flow, "PR", "eta %", "+/-", "h", "+/-"];
+        vec![&units.speed, "step", "valve area", &units.flow, "PR", "eta %", "+/-", "h", "+/-"];
     heads.extend(with_truth.then_some("true %"));
     heads.push("");
     let mut table = Table::new(heads);
@@ -255,7 +255,7 @@ pub(crate) fn points_by_line(
     }
     let mut document = Document::default();
     document.text(format!(
-        "Points by corrected speed in {} and opening of the back-pressure valve, corrected flow in {}, h in W/(m2 K).",
+        "Points by corrected speed in {} and area of the back-pressure valve in per cent of its nominal area, corrected flow in {}, h in W/(m2 K).",
         units.speed, units.flow
     ));
     if let Some(map) = map {
@@ -319,18 +319,12 @@ pub(crate) fn allowance_sentence<'a>(points: impl Iterator<Item = &'a Identified
     ))
 }
 
-/// A valve opening with three decimals; `-` if the recording does not contain it.
-pub(crate) fn opening(ratio: f64) -> String {
-    // Valves are set to a thousandth at best.
-    if ratio.is_finite() { ((1e3 * ratio).round() / 1e3).to_string() } else { "-".to_owned() }
-}
-
 /// The number of a point's step, from 1, and whether it is a repeat.
 pub(crate) fn step_name(point: &IdentifiedPoint) -> String {
     match point.kind {
         StepKind::Point => step_number(point.step).to_string(),
         StepKind::Repeat => format!("{} repeat", step_number(point.step)),
-        StepKind::Return => format!("{} again", step_number(point.step)),
+        StepKind::Return => format!("{} return", step_number(point.step)),
         StepKind::Approach => format!("{} surge", step_number(point.step)),
     }
 }
@@ -360,7 +354,7 @@ pub fn disagreement_text(
     let (point, other, distance) = disagreeing.iter().max_by(|a, b| a.2.total_cmp(&b.2))?;
     Some(format!(
         "Methods disagree: at {} of {} points the efficiency by `dynamic` lies outside both 95 % intervals of the one by `joint`, by up \
-         to {:.1} points (step {}, {} {}, opening {}: {:.1} % against {:.1} %). `dynamic` takes alpha_A and the probe as declared and h \
+         to {:.1} points (step {}, {} {}, valve area {}: {:.1} % against {:.1} %). `dynamic` takes alpha_A and the probe as declared and h \
          as constant in each step; `joint` finds them from all steps.\n",
         disagreeing.len(),
         pairs.len(),
@@ -368,7 +362,7 @@ pub fn disagreement_text(
         step_number(point.step),
         display.speed(point.speed_rpm),
         display.units().speed,
-        crate::point_results::points::opening(point.valve_opening_ratio),
+        valve_area_text(point.valve_opening_ratio),
         100.0 * other.eta,
         100.0 * point.eta.unwrap_or(f64::NAN),
     ))
@@ -404,15 +398,15 @@ pub fn shared_errors_text<'a>(
         };
         let total = half(|point| Some(0.5 * (point.eta_high? - point.eta_low?)))?;
         let common = half(|point| Some(half_width_95(point.common.eta_standard_error())))?;
-        Some(format!("{common:.2} of a half width of {total:.2} points"))
+        Some(format!("+/- {common:.2} of the +/- {total:.2} points"))
     };
     let first = format!("{} at {} {}", describe(&slow)?, display.speed(slowest_rpm), display.units().speed);
     let parts = match describe(&fast) {
-        Some(others) => format!("{first} and {others} above"),
+        Some(others) => format!("{first}, {others} at higher speeds"),
         None => first,
     };
     Some(format!(
-        "Common to all points (offsets, gains and shared parameters of the method, with the same error at every point): {parts}; in \
-         quadrature, the remainder is independent for each point. The map's files have both parts."
+        "The efficiencies of all points share one error (sensor offsets and gains, parameters of the method): {parts} (95 %). It moves the whole \
+         map together; the remainder, in quadrature, is independent for each point. The map's files have both parts."
     ))
 }

@@ -518,7 +518,7 @@ fn poor_fit(evidence: &PoorFit) -> Sentence {
             number(*eta, 3)
         ),
         PoorFit::NoiseRatio { residual_ratio } => sentence!(
-            "the residual of T2 is {} times the declared noise: something disturbed it, or declare more noise",
+            "the residual of T2 is {} times the declared noise: look for a disturbance of T2; if there is none, declare more noise",
             number(*residual_ratio, 1)
         ),
         PoorFit::Noise { residual_k, noise_k } => sentence!(

@@ -11,6 +11,7 @@ use crate::point_results::points::{
     END_S, allowance_sentence, disagreement_text, point_tables, shared_errors_text, verdict_sentence,
 };
 use crate::point_results::summary::{PointResults, score_sentences};
+use crate::point_results::wheel_table::wheel_section;
 use crate::test_report::conditions::{
     JudgedPoints, acceptance_section, balance_section, condition_table, instruments_section, witness_table,
 };
@@ -282,6 +283,12 @@ impl RunReport<'_> {
         document.text(shared_errors_text(self.results.identified(), display).unwrap_or_default());
         let tables = point_tables(self.results.map, self.results.points, self.recording, display);
         tables.into_iter().for_each(|table| document.table(table));
+        let wheel = self.campaign.and_then(|campaign| {
+            wheel_section(campaign, self.results.points, self.recording, self.gases.compressor, display)
+        });
+        if let Some(wheel) = wheel {
+            document.folded_section("Wheel and outlet pipe", wheel);
+        }
         document
     }
 
@@ -449,6 +456,19 @@ fn campaign_rows(campaign: &Campaign) -> Vec<(&'static str, String)> {
             report.humidity_ratio.map_or_else(missing, |ratio| format!("{:.0} %", 100.0 * ratio)),
         ),
     ];
+    let stand: Vec<String> = report.stand.iter().map(|(name, value)| format!("{name}: {value}")).collect();
+    rows.extend((!stand.is_empty()).then(|| ("stand", stand.join("; "))));
+    let pipe_mm = |diameter_m: f64| format!("{:.1} mm", 1e3 * diameter_m);
+    let (compressor, turbine) = (&campaign.machine.params.compressor, &campaign.machine.params.turbine);
+    rows.push((
+        "pipes",
+        format!(
+            "compressor inlet {}, outlet {}; turbine inlet {}",
+            pipe_mm(compressor.inlet_diameter_m),
+            pipe_mm(compressor.outlet_diameter_m),
+            pipe_mm(turbine.inlet_diameter_m)
+        ),
+    ));
     rows.extend(assumed_sentence(campaign).map(|sentence| ("sizes of the machine", sentence)));
     if let Some(k) = report.cell_temperature_k {
         rows.push(("cell", format!("{} {}", display.temperature(k), campaign.display.temperature)));

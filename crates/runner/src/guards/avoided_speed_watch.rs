@@ -45,7 +45,7 @@ impl Guard for AvoidedSpeedWatch {
             guard: GuardName::AvoidedSpeed,
             reaction,
             reason: format!(
-                "the shaft was within the speeds to avoid, {} to {} krpm, for {inside_s:.1} s; at most {:.1} s are allowed",
+                "the shaft was within the speeds to avoid, {:.2} to {:.2} krpm, for {inside_s:.1} s; at most {:.1} s are allowed",
                 range.from_rpm / 1e3,
                 range.to_rpm / 1e3,
                 range.longest_s

@@ -289,7 +289,10 @@ impl Run<'_, '_> {
         let refused = self.protection.stand.and_then(|stand| stand.avoid.refusing(step.to.speed_rpm));
         let Some(range) = refused else { return Ok(()) };
         let (from_krpm, to_krpm) = (range.from_rpm / 1e3, range.to_rpm / 1e3);
-        let reason = format!("the step to {} would stay within {from_krpm} to {to_krpm} krpm", step.to);
+        let reason = format!(
+            "the step to {} would stay within {from_krpm:.2} to {to_krpm:.2} krpm",
+            step.to.in_words()
+        );
         let (guard, reaction) = (GuardName::AvoidedSpeed, Reaction::Safe);
         Err(Halt::Tripped(Trip { t_s: self.now_s, guard, reaction, reason }, None))
     }

@@ -25,12 +25,13 @@ use mapper_observe::FusedChannel;
 use mapper_observe::declared::CommonOffset;
 use mapper_observe::energy_balance::Gases;
 use mapper_physics::gas::air::Air;
+use mapper_physics::laws::wheel::WheelCoefficients;
 use mapper_recording::score::{
     PendingTruths, ScoreSummary, ScoredPoint, ScoredTurbinePoint, Truth, score, score_marks, score_turbine,
     with_truths,
 };
 use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
-use mapper_report::{Message, PointResults, SurgeReport};
+use mapper_report::{Message, PointResults, SurgeReport, wheel_coefficients};
 use mapper_runner::surge::SurgeMarks;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -59,7 +60,7 @@ pub struct Identified {
     pub turbine_housing: Option<TurbineHousing>,
     /// Parameters common to all points (joint method).
     pub thermal: Option<ThermalModel>,
-    /// Two-parameter results for the same steps (joint method).
+    /// Results of the dynamic method for the same steps (joint method).
     pub dynamic: Vec<DynamicEfficiency>,
     /// Faults of sensors or machine that are needed to explain the recording.
     #[serde(skip)]
@@ -86,6 +87,15 @@ pub struct Identified {
     /// Other remarks.
     #[serde(serialize_with = "mapper_core::json_messages::serialize")]
     pub remarks: Vec<ResultRemark>,
+}
+
+/// Coefficients of the wheel at a point.
+#[derive(Debug, Serialize)]
+struct WheelStep {
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
+    step: usize,
+    #[serde(flatten)]
+    coefficients: WheelCoefficients,
 }
 
 impl Identified {
@@ -120,6 +130,13 @@ impl Identified {
         }
         if let Some(surge) = &self.surge {
             value["surge"] = json!(surge);
+        }
+        if let Some(wheel_diameter_m) = self.config.wheel_diameter_m {
+            let wheel = |point: &IdentifiedPoint| WheelStep {
+                step: point.step,
+                coefficients: wheel_coefficients(point, wheel_diameter_m, self.config.air),
+            };
+            value["wheel"] = json!(self.points_alone().map(wheel).collect::<Vec<_>>());
         }
         value
     }

@@ -47,6 +47,10 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         internal_area_m2: campaign.machine.params.compressor.internal_area_m2,
         internal_area_sigma_ratio: internal_area_sigma_ratio(&campaign.machine.assumed),
         air: campaign.machine.params.compressor.air(),
+        wheel_diameter_m: campaign
+            .machine
+            .wheel_is_declared
+            .then_some(campaign.machine.params.compressor.wheel_diameter_m),
         turbine_gas: campaign.machine.params.turbine.gas,
         turbine: campaign.machine.params.turbine,
         shaft_inertia_kgm2: campaign.machine.params.shaft_inertia_kgm2,

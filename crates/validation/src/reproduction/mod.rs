@@ -7,14 +7,17 @@ mod lab;
 #[cfg(test)]
 #[path = "../../tests/inside/model_table.rs"]
 mod model_table;
+#[cfg(test)]
+#[path = "../../tests/inside/paper_heat.rs"]
+mod paper_heat;
 mod picture;
 
 pub use crate::reproduction::lab::ReproduceError;
 pub use lab::{FigureResult, Statement, Table, Verdict, picture_path};
 pub use picture::{figure_json, reproduction_page};
 
-/// Numbers of the reproduced figures, in order.
-pub const FIGURES: [&str; 8] = ["5", "6", "7", "8", "9", "10", "11", "12"];
+/// Numbers of the reproduced figures, in order. Figures 1, 3 and 4 are drawings without results.
+pub const FIGURES: [&str; 10] = ["2", "5", "6", "7", "8", "9", "10", "11", "12", "13"];
 
 /// Reproduces all figures; `progress` receives the number of each figure before it is computed.
 pub fn reproduce(mut progress: impl FnMut(&str)) -> Result<Vec<FigureResult>, ReproduceError> {
@@ -23,6 +26,7 @@ pub fn reproduce(mut progress: impl FnMut(&str)) -> Result<Vec<FigureResult>, Re
     for number in FIGURES {
         progress(number);
         results.push(match number {
+            "2" => figures::figure_2::figure(&lab::run_all(&model, lab::RUN_S)?)?,
             "5" => figures::figure_5::figure()?,
             "6" => figures::figure_6::figure(&lab::run_all(&model, lab::RUN_S)?)?,
             "7" => figures::figure_7::figure(&lab::run_all(&model, figures::figure_7::RUN_S)?)?,
@@ -30,7 +34,8 @@ pub fn reproduce(mut progress: impl FnMut(&str)) -> Result<Vec<FigureResult>, Re
             "9" => figures::figure_9::figure()?,
             "10" => figures::figure_10::figure()?,
             "11" => figures::figure_11::figure()?,
-            _ => figures::figure_12::figure()?,
+            "12" => figures::figure_12::figure()?,
+            _ => figures::figure_13::figure()?,
         });
     }
     Ok(results)

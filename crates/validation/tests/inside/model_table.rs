@@ -1,4 +1,4 @@
-//! The figures that an independent implementation found with this model (`docs/reference/model.md`, its last table): 4 jumps at
+//! The figures that an independent implementation found with this model (`docs/reference/model.md`): 4 jumps at
 //! openings 0.5, 0.7 and 1.0, noise-free, 10 to 110 s, errors against the mean in the window unless stated otherwise.
 //! Tolerances are half the last printed digit.
 

@@ -184,6 +184,7 @@ pub(crate) fn evaluate(
     let bearing_k = housing::bearing_k(
         bearing_w_k,
         params.bearing.oil_conductance_w_k,
+        housing::friction_heat_w(&params.bearing, y[SHAFT]),
         outer_k[BACK_NODE],
         y[TURBINE],
         boundary.oil_temperature_k,

@@ -3,6 +3,7 @@
 use crate::si_values::value_or;
 use crate::units::{Duration, Fraction, PressureRate, Quantity};
 use mapper_core::{SafeTrajectory, SpeedControlSettings};
+use mapper_yaml::keys::Off;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -37,14 +38,8 @@ impl SafeStateFile {
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum SpeedControlFile {
-    Named(NamedSpeedControl),
+    Off(Off),
     Settings(SettingsFile),
-}
-
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum NamedSpeedControl {
-    Off,
 }
 
 /// Control of the shaft speed.
@@ -59,7 +54,7 @@ pub(crate) struct SettingsFile {
 /// On unless the file switches it off.
 pub(crate) fn speed_control(file: Option<SpeedControlFile>) -> Option<SpeedControlSettings> {
     match file {
-        Some(SpeedControlFile::Named(NamedSpeedControl::Off)) => None,
+        Some(SpeedControlFile::Off(Off)) => None,
         Some(SpeedControlFile::Settings(file)) => {
             Some(SpeedControlSettings { band_ratio: value_or(file.band, SpeedControlSettings::BAND_RATIO) })
         }
@@ -85,7 +80,8 @@ mod tests {
     fn what_is_written_and_what_it_means() {
         let read =
             |text: &str| speed_control(crate::testing::any(text).unwrap()).map(|control| control.band_ratio);
-        assert_eq!((read("off"), read("{}"), read("{band: 1 %}")), (None, Some(0.003), Some(0.01)));
+        assert_eq!((read("off"), read("false")), (None, None));
+        assert_eq!((read("{}"), read("{band: 1 %}")), (Some(0.003), Some(0.01)));
         assert_eq!(speed_control(None), Some(SpeedControlSettings::default()));
     }
 }

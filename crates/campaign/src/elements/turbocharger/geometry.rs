@@ -2,7 +2,9 @@
 
 use crate::machine_sizes::similar_machine;
 use crate::si_values::element;
-use crate::units::{Area, Conductance, Conductivity, Inertia, Length, Mass, MassFlow, Quantity, Volume, set};
+use crate::units::{
+    Area, Conductance, Conductivity, Inertia, Length, Mass, MassFlow, Power, Quantity, Volume, set,
+};
 use mapper_core::InletConvection;
 use mapper_physics::machine::params::{BearingParams, CompressorParams, OutletParams, Params, TurbineParams};
 use schemars::JsonSchema;
@@ -130,6 +132,8 @@ element! {
         length => length_m: Quantity<Length> [extend("x-above" = "0 mm")];
         /// Conductance from the bearing housing to the oil.
         oil_conductance => oil_conductance_w_k: Quantity<Conductance> [extend("x-min" = "0 W/K")];
+        /// Heat of bearing friction to the bearing housing at 100 krpm, rising with the square of the speed; none if it is omitted. Its power belongs to the turbine's efficiency.
+        friction_heat => friction_heat_w: Quantity<Power> [extend("x-min" = "0 W", "x-max" = "10 kW")];
     }
 }
 

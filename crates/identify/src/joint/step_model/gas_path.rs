@@ -12,8 +12,9 @@ use mapper_physics::laws::compression::{
 };
 use mapper_physics::laws::convection::{self, InletLaw};
 use mapper_physics::laws::housing::{
-    bearing_conductance_w_k, bearing_k, capacity_j_k, external_heat_w, radiation_w,
+    bearing_conductance_w_k, bearing_k, capacity_j_k, external_heat_w, friction_heat_w, radiation_w,
 };
+use mapper_physics::machine::params::rad_s_of_rpm;
 use mapper_physics::rig::sensor_fault::ExactReadings;
 
 /// Minimum efficiency of the model. Bound: keeps the temperature rise finite while a fit searches.
@@ -380,7 +381,8 @@ impl Housing {
         }
         let conductance_w_k = bearing_conductance_w_k(&self.bearing) * (1.0 + shared[BEARING]);
         let oil_w_k = self.bearing.oil_conductance_w_k * shared[LN_OIL].exp();
-        let node_k = bearing_k(conductance_w_k, oil_w_k, tc_k, row.tt_k, row.oil_k);
+        let friction_w = friction_heat_w(&self.bearing, rad_s_of_rpm(row.speed_rpm));
+        let node_k = bearing_k(conductance_w_k, oil_w_k, friction_w, tc_k, row.tt_k, row.oil_k);
         conductance_w_k * (node_k - tc_k) + radiation_w(shared[RADIATION], row.tt_k, tc_k) + other_w - lost_w
     }
 

@@ -458,6 +458,7 @@ mod tests {
                 tt_k: 620.0,
                 oil_k: 360.0,
                 ambient_k: 298.0,
+                speed_rpm: 120e3,
                 place: (120e3, 0.06),
             }
         };

@@ -43,6 +43,7 @@ pub(crate) struct Row {
     pub(crate) tt_k: f64,
     pub(crate) oil_k: f64,
     pub(crate) ambient_k: f64,
+    pub(crate) speed_rpm: f64,
     /// Corrected speed and flow.
     pub(crate) place: (f64, f64),
 }
@@ -149,6 +150,7 @@ fn row(
     };
     let (t1_k, p1_pa, flow_kg_s) = (of(|row| row.t1_k), of(|row| row.p1_pa), of(|row| row.flow_kg_s));
     let tc_k = of(|row| row.tc_k);
+    let speed_rpm = speed_rpm.unwrap_or(end_state.speed_rpm);
     Row {
         t_s,
         t1_k,
@@ -162,7 +164,8 @@ fn row(
         tt_k: other(Channel::Tt),
         oil_k: other(Channel::TOil),
         ambient_k: other(Channel::TAmb),
-        place: place(config, speed_rpm.unwrap_or(end_state.speed_rpm), flow_kg_s, t1_k, p1_pa),
+        speed_rpm,
+        place: place(config, speed_rpm, flow_kg_s, t1_k, p1_pa),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Figure 12: error against the size of the transient, with the noise and the offsets of a rig.
 
 use crate::reproduction::lab::{
-    Jump, Outcome, RUN_S, Run, dynamic_config, fixed, identify_recording, rms, run_lagged,
+    Jump, Outcome, PROBE_M, RUN_S, Run, dynamic_config, fixed, identify_recording, rms, run_lagged,
 };
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Figure, Marker, Panel, Rule, RuleAt, Scatter, palette};
@@ -20,10 +20,10 @@ const STEPS_RPM: [f64; 10] = [-100e3, -60e3, -40e3, -20e3, -5e3, 5e3, 20e3, 40e3
 const FROM_RPM: std::ops::RangeInclusive<f64> = 45e3..=155e3;
 const OPENINGS: [f64; 3] = [0.5, 0.7, 1.0];
 /// Number of campaigns: each has its own offsets, and each run its own noise.
-const SEEDS: u64 = 6;
+pub(crate) const SEEDS: u64 = 6;
 
 /// A good rig: one-sigma noise at 10 Hz, fixed offset, gain; SI units.
-const RIG: [(Channel, f64, f64, f64); 7] = [
+pub(crate) const RIG: [(Channel, f64, f64, f64); 7] = [
     (Channel::ShaftSpeed, 30.0, 0.0, 0.0),
     (Channel::CompressorFlow, 1.5e-4, 0.0, 0.005),
     (Channel::P1, 20.0, 50.0, 0.0),
@@ -32,14 +32,12 @@ const RIG: [(Channel, f64, f64, f64); 7] = [
     (Channel::T2, 0.1, 0.25, 0.0),
     (Channel::Tc, 0.15, 0.3, 0.0),
 ];
-/// Diameter of the paper's probes, m; the method assumes ideal probes.
-const PROBE_M: f64 = 1.5e-3;
 /// Lag of P3, s. Judgement: the paper's rig changes it "somewhat slower" than its model, which steps it.
-const P3_LAG_S: f64 = 2.0;
+pub(crate) const P3_LAG_S: f64 = 2.0;
 /// Bins of |dT2|, K.
 const BINS_K: [(f64, f64); 5] = [(0.0, 2.0), (2.0, 5.0), (5.0, 10.0), (10.0, 15.0), (15.0, f64::INFINITY)];
 
-fn config() -> IdentifyConfig {
+pub(crate) fn config() -> IdentifyConfig {
     let mut config = dynamic_config(0.0);
     for (channel, noise_sigma, offset_sigma, gain_sigma_ratio) in RIG {
         config.declared.insert(channel, DeclaredUncertainty { noise_sigma, offset_sigma, gain_sigma_ratio });
@@ -47,8 +45,17 @@ fn config() -> IdentifyConfig {
     config
 }
 
+/// Draws the offset and the gain error of each channel of [`RIG`].
+pub(crate) fn draw_errors(rng: &mut impl Rng) -> Vec<(f64, f64)> {
+    let draw = |(_, _, offset, gain): &(Channel, f64, f64, f64)| {
+        let [a, b]: [f64; 2] = [StandardNormal.sample(rng), StandardNormal.sample(rng)];
+        (a * offset, b * gain)
+    };
+    RIG.iter().map(draw).collect()
+}
+
 /// White noise with 0.8 and first-order noise (2 s) with 0.6 of each sigma; offsets and gains as given.
-fn add_sensor_errors(clean: &Recording, errors: &[(f64, f64)], rng: &mut impl Rng) -> Recording {
+pub(crate) fn add_sensor_errors(clean: &Recording, errors: &[(f64, f64)], rng: &mut impl Rng) -> Recording {
     let mut measured = clean.clone();
     for ((channel, sigma, ..), (offset, gain)) in RIG.into_iter().zip(errors) {
         let Some(series) = measured.series.get_mut(&channel) else { continue };
@@ -85,13 +92,7 @@ fn measured() -> Result<Vec<Outcome>, ReproduceError> {
     let mut all_outcomes = Vec::new();
     for seed in 0..SEEDS {
         let mut rng = Pcg64::seed_from_u64(seed);
-        let errors: Vec<(f64, f64)> = RIG
-            .iter()
-            .map(|(_, _, offset, gain)| {
-                let [a, b]: [f64; 2] = [StandardNormal.sample(&mut rng), StandardNormal.sample(&mut rng)];
-                (a * offset, b * gain)
-            })
-            .collect();
+        let errors = draw_errors(&mut rng);
         for run in &runs {
             all_outcomes.push(identify_recording(
                 run,

@@ -69,10 +69,10 @@ pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
         Statement::new(
             "Typical variations of flow, pressure ratio and speed over the period: 0.8 %, 2 %, 1.5 % (section 3).",
             format!(
-                "Speed {} %, pressure ratio {} %, flow {} %.",
-                range(drift(|t| t.speed_rpm), 1),
+                "Flow {} %, pressure ratio {} %, speed {} %.",
+                range(drift(|t| t.flow_kg_s), 1),
                 range(drift(|t| t.pressure_ratio), 1),
-                range(drift(|t| t.flow_kg_s), 1)
+                range(drift(|t| t.speed_rpm), 1)
             ),
             Verdict::Partly,
         ),

@@ -263,7 +263,7 @@ fn describe_removed_residual(term: &ClosureTerm) -> String {
 /// The most probable answer, and what it does to the map.
 pub fn headline(diagnosis: &Diagnosis) -> String {
     let effect = diagnosis.map_effect.as_ref().map(|effect| format!(": {}", map_effect(effect)));
-    answer(diagnosis) + &effect.unwrap_or_default()
+    format!("{}{}", answer(diagnosis), effect.unwrap_or_default())
 }
 
 /// Changes of an efficiency below this are not worth a word, fraction.

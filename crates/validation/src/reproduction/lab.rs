@@ -18,7 +18,7 @@ const RATE_HZ: f64 = 10.0;
 const RELATIVE_TOLERANCE: f64 = 1e-8;
 
 /// Conductance to the oil and heat of bearing friction at 100 krpm of the machine with the paper's heat, `campaigns/turbo_paper.yaml`, W/K
-/// and W. The paper prints neither. Fit to the signs of figures 5 and 11 (a): `cargo test -p mapper-validation the_paper_s_heat`.
+/// and W. The paper prints neither. Fit to the signs of figures 5 and 11 (a): `cargo test --locked -p mapper-validation the_paper_s_heat`.
 const PAPER_HEAT: (f64, f64) = (9.0, 440.0);
 /// Diameter of the probes on the paper's rig, m. Source: section 4.2.
 pub(crate) const PROBE_M: f64 = 1.5e-3;

@@ -50,13 +50,10 @@ fn time_constant_s(run: &Run, value: fn(&Truth) -> f64) -> f64 {
 /// Seconds after which flow, pressure ratio and speed stay within the paper's variations over 100 s; `None` if they do not within the run.
 fn stable_s(run: &Run) -> Option<f64> {
     let bands = SettleBands::PAPER;
-    let signals: [(fn(&Truth) -> f64, f64); 3] = [
-        (|t| t.flow_kg_s, bands.flow_ratio),
-        (|t| t.pressure_ratio, bands.pressure_ratio_ratio),
-        (|t| t.speed_rpm, bands.speed_ratio),
-    ];
+    let values: [fn(&Truth) -> f64; 3] = [|t| t.flow_kg_s, |t| t.pressure_ratio, |t| t.speed_rpm];
+    let bands = [bands.flow_ratio, bands.pressure_ratio_ratio, bands.speed_ratio];
     let mut start_s = 0.0f64;
-    for (value, band) in signals {
+    for (value, band) in values.into_iter().zip(bands) {
         let last = value(run.truth.last()?);
         let (mut low, mut high) = (last, last);
         let leaves = run.truth.iter().rev().find(|truth| {

@@ -95,6 +95,6 @@ pub use test_plan::plan::{
 pub use test_plan::points::{Dwell, Jump, OperatingPoint, Repeats, Timing, VisitOrder, valve_area_text};
 pub use test_plan::step_number::step_number;
 pub use text::{
-    coloured_text, one_line, probability_text, readable, shorten_numbers, temperature, terminal_json,
+    coloured_text, krpm, one_line, probability_text, readable, shorten_numbers, temperature, terminal_json,
     terminal_text, with_unit,
 };

@@ -71,6 +71,11 @@ pub fn temperature(value_k: f64) -> String {
     format!("{:.1} degC ({value_k:.1} K)", value_k - ICE_POINT_K)
 }
 
+/// A speed for display: in krpm, to 0.01.
+pub fn krpm(speed_rpm: f64) -> f64 {
+    (100.0 * speed_rpm / RPM_PER_KRPM).round() / 100.0
+}
+
 /// Size above which a value is written with a power of ten. Bound: far above every reading.
 const MAX_PLAIN: f64 = 1e9;
 

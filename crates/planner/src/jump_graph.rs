@@ -1,6 +1,6 @@
 //! The jumps that no limit forbids, as a directed graph: the points that one order can reach, and ways around a forbidden jump.
 
-use mapper_core::{AvoidedCrossing, Jump, OperatingPoint, readable, temperature};
+use mapper_core::{AvoidedCrossing, Jump, OperatingPoint, krpm, readable, temperature};
 use mapper_physics::operating_point::transition_forecast::{TransitionViolation, surge_excess_ratio};
 use petgraph::algo::{astar, tarjan_scc};
 use petgraph::graphmap::DiGraphMap;
@@ -38,8 +38,8 @@ pub enum Rejection {
     )]
     Arrival { needed_s: f64, available_s: f64 },
     #[error(
-        "the shaft is within the speeds to avoid, {:.2} to {:.2} krpm, for {:.1} s; at most {:.1} s are allowed",
-        .0.range.from_rpm / 1e3, .0.range.to_rpm / 1e3, .0.inside_s, .0.range.longest_s
+        "the shaft is within the speeds to avoid, {} to {} krpm, for {:.1} s; at most {:.1} s are allowed",
+        krpm(.0.range.from_rpm), krpm(.0.range.to_rpm), .0.inside_s, .0.range.longest_s
     )]
     Avoided(AvoidedCrossing),
 }

@@ -1,6 +1,7 @@
 //! What a plan is made of: operating points, repeats, dwell, and the order of the visits.
 
 use crate::enums::named_enum;
+use crate::text::krpm;
 use crate::unit_factors::RPM_PER_KRPM;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -69,7 +70,7 @@ impl OperatingPoint {
     /// Speed to 0.01 krpm and valve area for display: `110 krpm, valve area 70 %`.
     pub fn in_words(&self) -> String {
         let valve = valve_area_text(self.valve_opening_ratio);
-        format!("{} krpm, valve area {valve}", (self.speed_rpm / 10.0).round() / 100.0)
+        format!("{} krpm, valve area {valve}", krpm(self.speed_rpm))
     }
 
     /// Whether two points are the same on any rig: speeds within 1e-3 rpm, openings within 1e-6.

@@ -4,7 +4,7 @@ use crate::machine::params::BoundaryConditions;
 use crate::simulation::model::Model;
 use crate::simulation::steady;
 use crate::simulation::steady::{SteadyError, SteadyState};
-use mapper_core::{AvoidedRange, Limits, OperatingPoint, readable, temperature};
+use mapper_core::{AvoidedRange, Limits, OperatingPoint, krpm, readable, temperature};
 use serde::{Deserialize, Serialize};
 
 /// Temperatures that follow the compressor's outlet temperature.
@@ -70,11 +70,11 @@ pub enum Obstacle {
     Opening { highest_ratio: f64 },
     #[error("cannot be held: {0}")]
     NoSteadyState(#[source] SteadyError),
-    #[error("is above the speed limit, `limits.speed` = {:.2} krpm", .limit_rpm / 1e3)]
+    #[error("is above the speed limit, `limits.speed` = {} krpm", krpm(*.limit_rpm))]
     Speed { limit_rpm: f64 },
     #[error(
-        "is within the speeds to avoid, `limits.avoid` from {:.2} to {:.2} krpm; allowed next to them: {}", .range.from_rpm / 1e3,
-        .range.to_rpm / 1e3, .nearest_rpm.iter().map(|rpm| readable(*rpm, "rpm")).collect::<Vec<_>>().join(" and ")
+        "is within the speeds to avoid, `limits.avoid` from {} to {} krpm; allowed next to them: {}", krpm(.range.from_rpm),
+        krpm(.range.to_rpm), .nearest_rpm.iter().map(|rpm| readable(*rpm, "rpm")).collect::<Vec<_>>().join(" and ")
     )]
     Avoided { range: AvoidedRange, nearest_rpm: Vec<f64> },
     #[error(

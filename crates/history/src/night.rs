@@ -47,7 +47,7 @@ impl PointRow {
     pub fn label(&self) -> String {
         let visit = if self.visit == 0 { String::new() } else { format!(", visit {}", self.visit + 1) };
         let (krpm, valve) =
-            (mapper_core::krpm(self.speed_rpm), (1e3 * self.valve_opening_ratio).round() / 10.0);
+            ((self.speed_rpm / 10.0).round() / 100.0, (1e3 * self.valve_opening_ratio).round() / 10.0);
         format!("{krpm} krpm, valve area {valve} %{visit}")
     }
 }

@@ -4,7 +4,7 @@ use crate::diagnosis::gap_next::next_section;
 use crate::diagnosis::gap_text::{cause, headline};
 use crate::document::{Document, Table};
 use crate::formatting::{display_scale, four_figures, with_margins};
-use mapper_core::Margins;
+use mapper_core::{Margins, valve_area_text};
 use mapper_diagnose::gap::{CorrectedMap, Diagnosis, ForecastCheck, NotCorrected, PointCorrection};
 
 /// The residual of each channel. `seal`: the hash of the prediction.
@@ -42,13 +42,13 @@ pub(crate) fn correction_table(points: &[PointCorrection]) -> Table {
         [
             point.step.to_string(),
             format!("{:.1}", point.speed_rpm / 1e3),
-            format!("{:.3}", point.valve),
+            valve_area_text(point.valve),
             or_none(point.before.map(value)),
             or_none(point.after.map(value)),
             or_none(change.map(|change| format!("{change:+.2}"))),
         ]
     };
-    let heads = ["step", "krpm", "valve", "as recorded", "corrected", "change, points"];
+    let heads = ["step", "krpm", "valve area", "as recorded", "corrected", "change, points"];
     Table::new(heads).caption("Efficiency, %, with its 95 % interval").rows(points.iter().map(row))
 }
 

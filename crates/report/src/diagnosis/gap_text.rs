@@ -4,7 +4,7 @@ use crate::diagnosis::gap_next::{heat_table, next_section, residual_maps, traces
 use crate::diagnosis::stand_actions::{next_measurement, stand_actions};
 use crate::document::{Cell, Describe, Document, Table};
 use crate::formatting::{Message, display_scale, four_figures};
-use mapper_core::{Channel, probability_text, step_number, with_unit};
+use mapper_core::{Channel, probability_text, step_number, valve_area_text, with_unit};
 use mapper_diagnose::gap::{
     Baseline, BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosed, Diagnosis, Estimate, Evidence, Gap,
     MapEffect, PointGap, SmallestSeen, Verdict,
@@ -275,8 +275,9 @@ fn map_effect(effect: &MapEffect) -> String {
         return "no efficiency reads wrong because of it".to_owned();
     }
     format!(
-        "from its step alone, efficiency at {:.0} krpm and opening {valve:.2} reads {:.2} +/- {:.2} points {}",
+        "from its step alone, efficiency at {:.0} krpm and valve area {} reads {:.2} +/- {:.2} points {}",
         speed_rpm / 1e3,
+        valve_area_text(*valve),
         100.0 * eta_error.abs(),
         100.0 * half_interval,
         if *eta_error > 0.0 { "high" } else { "low" }

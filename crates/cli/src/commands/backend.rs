@@ -2,7 +2,7 @@
 
 use crate::environment::{registry, rig_states_directory};
 use crate::output::failure::{Code, Failure};
-use crate::output::standard_output;
+use crate::output::streams;
 use clap::{Args, Subcommand};
 use mapper_core::{RigMode, Setpoints};
 use mapper_driver_host::conformance::{Candidate, check_rules};
@@ -69,7 +69,7 @@ impl Backend {
             )
             .collect();
         if self.json {
-            return standard_output::print_json(&json!({ "backends": backends }));
+            return streams::print_json(&json!({ "backends": backends }));
         }
         let mut table = mapper_report::Table::new(["backend", "summary"]).with_texts([1]);
         for entry in &backends {
@@ -85,7 +85,7 @@ impl Backend {
         }
         let mut document = mapper_report::Document::default();
         document.table(table);
-        standard_output::show(&document)
+        streams::show(&document)
     }
 
     fn check(&self, name: &str, path: &Path) -> Result<(), Failure> {
@@ -93,8 +93,7 @@ impl Backend {
         let registry = registry();
         let named = campaign.backend.name.clone();
         if named != name {
-            // Built-in backends need no settings. A driver needs at least an address, and the settings of another backend do not contain
-            // it.
+            // Built-in backends need no settings; a driver needs an address, which the settings of another backend do not contain.
             if !registry.backends.iter().any(|plugin| plugin.name == name) {
                 let is_known = INCLUDED_DRIVERS.iter().any(|(known, ..)| *known == name);
                 let message = match is_known || mapper::driver_locations().find(name).is_some() {
@@ -143,13 +142,13 @@ impl Backend {
             let rules = results.iter().map(
                 |(rule, kept)| json!({"rule": rule, "kept": kept.is_ok(), "found": kept.as_ref().err()}),
             );
-            standard_output::print_json(&json!({"backend": name, "rules": rules.collect::<Vec<_>>()}))?;
+            streams::print_json(&json!({"backend": name, "rules": rules.collect::<Vec<_>>()}))?;
         } else {
             let lines = results.iter().map(|(rule, kept)| match kept {
                 Ok(()) => format!("kept    {rule}\n"),
                 Err(finding) => format!("BROKEN  {rule}: {finding}\n"),
             });
-            standard_output::print(&lines.collect::<String>())?;
+            streams::print(&lines.collect::<String>())?;
         }
         match broken {
             0 => Ok(()),

@@ -3,7 +3,7 @@
 use crate::environment::{registry, today};
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
-use crate::output::{output_options, standard_output};
+use crate::output::{output_options, streams};
 use clap::Args;
 use mapper_campaign::CampaignError;
 use mapper_campaign::campaign::Date;
@@ -35,7 +35,7 @@ impl Check {
                 let omitted = findings.omitted;
                 let mut mistakes = Failure::of_campaign(CampaignError::Mistakes(findings)).json();
                 (mistakes["campaign"], mistakes["omitted"]) = (json!(null), json!(omitted));
-                standard_output::print_json(&mistakes)?;
+                streams::print_json(&mistakes)?;
                 return Err(Failure::printed(Code::BadInput));
             }
             Err(error) => return Err(Failure::of_campaign(error)),
@@ -54,7 +54,7 @@ impl Check {
         let warnings = mapper_campaign::warnings(&text, &self.campaign, &campaign, forecast.concerns);
         let lines = mapper_campaign::resolved_lines(&campaign, &model);
         if self.json {
-            return standard_output::print_json(&json!({
+            return streams::print_json(&json!({
                 "campaign": campaign.name,
                 "points": campaign.points.len(),
                 "lines": lines,
@@ -71,9 +71,9 @@ impl Check {
             }));
         }
         if warnings.count() > 0 {
-            standard_output::warn(&warnings.render(output_options::is_stderr_coloured()));
+            streams::say(&warnings.render(output_options::is_stderr_coloured()));
         }
-        standard_output::show(
+        streams::show(
             &CheckedCampaign {
                 file: &self.campaign,
                 campaign: &campaign,

@@ -3,7 +3,7 @@
 use crate::command_line::subcommands;
 use crate::environment::{with_fleet, with_machine};
 use crate::output::failure::{Code, Failure};
-use crate::output::{output_options, standard_output};
+use crate::output::{output_options, streams};
 use clap::Args;
 use mapper_fleet::{
     CreatedStudy, Hash, ItemSelection, Limits, MergeOutcome, Shard, SubmitOptions, Template, kind_of,
@@ -56,11 +56,7 @@ impl Estimate {
         let tried = with_fleet(&self.directory, None, |fleet, kind, engine, machine| {
             fleet.estimate_cost(kind, self.tries.into(), engine, machine)
         })?;
-        if self.json {
-            standard_output::print_json(&tried.cost)
-        } else {
-            standard_output::show(&tried.cost.document())
-        }
+        streams::show_result(&tried.cost, self.json)
     }
 }
 
@@ -90,7 +86,7 @@ impl Make {
             let items = made.fleet.study.items.len();
             if self.json {
                 let (new, gone) = (made.new, made.gone);
-                return standard_output::print_json(
+                return streams::print_json(
                     &json!({ "directory": self.out, "items": items, "new": new, "gone": gone }),
                 );
             }
@@ -99,7 +95,7 @@ impl Make {
             } else {
                 format!(", {} of them new; {} were removed", made.new, made.gone)
             };
-            standard_output::print(&format!(
+            streams::print(&format!(
                 "{items} items in {dir}{changed}\nEstimate their cost: mapper fleet estimate {dir}\n",
                 dir = self.out.display()
             ))
@@ -139,9 +135,9 @@ pub fn print_merged(
 ) -> Result<(), Failure> {
     if json {
         let result = merged.result.as_ref().map(|(path, _)| path);
-        standard_output::print_json(&json!({ "status": merged.status, "result": result }))?;
+        streams::print_json(&json!({ "status": merged.status, "result": result }))?;
     } else {
-        standard_output::show(&merged.document())?;
+        streams::show(&merged.document())?;
     }
     if is_complete {
         return Ok(());
@@ -162,11 +158,7 @@ pub struct Retry {
 impl Retry {
     pub fn run(&self) -> Result<(), Failure> {
         let submission = with_fleet(&self.directory, None, |fleet, _, _, machine| fleet.retry(machine))?;
-        if self.json {
-            standard_output::print_json(&submission)
-        } else {
-            standard_output::show(&submission.document())
-        }
+        streams::show_result(&submission, self.json)
     }
 }
 
@@ -217,10 +209,10 @@ impl Status {
             let fleet = mapper_fleet::Fleet::open(&self.directory, &program(registry))?;
             if self.items {
                 if self.json {
-                    return standard_output::print_json(&json!({ "items": fleet.study.items }));
+                    return streams::print_json(&json!({ "items": fleet.study.items }));
                 }
                 let line = |item: &mapper_fleet::ItemEntry| format!("{}  {}\n", item.hash, item.name);
-                return standard_output::print(&fleet.study.items.iter().map(line).collect::<String>());
+                return streams::print(&fleet.study.items.iter().map(line).collect::<String>());
             }
             let status = fleet.status();
             // The queue is queried only if items are unfinished, and with a time limit.
@@ -230,11 +222,11 @@ impl Status {
             });
             if self.json {
                 let left_s = status.left_s();
-                return standard_output::print_json(
+                return streams::print_json(
                     &json!({ "study": fleet.study.name, "status": status, "core_s_left": left_s, "queue": states }),
                 );
             }
-            standard_output::show(&study_status(&fleet.study.name, &status, states.as_ref()))
+            streams::show(&study_status(&fleet.study.name, &status, states.as_ref()))
         })
     }
 }
@@ -301,11 +293,7 @@ impl Submit {
             let cost = fleet.estimate_cost(kind, TRIAL_ITEMS, engine, machine)?.cost;
             fleet.submit(&options, &cost, machine)
         })?;
-        if self.json {
-            standard_output::print_json(&submission)
-        } else {
-            standard_output::show(&submission.document())
-        }
+        streams::show_result(&submission, self.json)
     }
 }
 
@@ -352,14 +340,14 @@ impl Work {
                 fleet.work(kind, which, self.again, engine, machine)
             })?;
         if self.json {
-            standard_output::print_json(
+            streams::print_json(
                 &json!({ "done": outcome.done, "there": outcome.already_done, "failed": outcome.failed }),
             )?;
         } else {
             let failed = outcome.failed.iter().map(|(name, why)| format!("failed: {name}: {why}\n"));
             let failed: String = failed.collect();
             let (done, there) = (outcome.done, outcome.already_done);
-            standard_output::print(&format!("{failed}{done} done, {there} were already done\n"))?;
+            streams::print(&format!("{failed}{done} done, {there} were already done\n"))?;
         }
         if outcome.failed.is_empty() {
             return Ok(());

@@ -3,8 +3,7 @@
 use crate::environment::registry;
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
-use crate::output::standard_output;
-use crate::output::standard_output::FileOutput;
+use crate::output::streams::{self, FileOutput};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
@@ -74,9 +73,9 @@ impl Plan {
         if let [from, to] = self.why.as_slice() {
             let jump = mapper_planner::explain_jump(&request, *from, *to).map_err(SessionError::from)?;
             return if self.output.json {
-                standard_output::print_json(&jump_json(&jump))
+                streams::print_json(&jump_json(&jump))
             } else {
-                standard_output::show(&jump_forecast(&campaign, &jump))
+                streams::show(&jump_forecast(&campaign, &jump))
             };
         }
         let appended = self.append.first().zip(self.append.get(1)).map(|(&from, &to)| Jump { from, to });
@@ -97,11 +96,11 @@ impl Plan {
             if let Some(others) = &others {
                 value["comparison"] = comparison_json(&plan, others);
             }
-            return standard_output::print_json(&value);
+            return streams::print_json(&value);
         }
         let mut document = plan_document(&campaign, &plan);
         document.append(others.map(|others| plan_comparison(&plan, &others)).unwrap_or_default());
-        standard_output::show(&document)
+        streams::show(&document)
     }
 
     /// Rehearses a script and prints the forecast plan.
@@ -122,7 +121,7 @@ impl Plan {
             let mut value = plan_json(campaign, &plan)?;
             value["forecast"] = true.into();
             value["notes"] = notes.into();
-            return standard_output::print_json(&value);
+            return streams::print_json(&value);
         }
         let mut document = plan_document(campaign, &plan);
         notes.into_iter().for_each(|note| document.text(format!("note: {note}")));
@@ -130,7 +129,7 @@ impl Plan {
             "Forecast: the script {} was rehearsed on the nominal machine; on the rig it may take other steps, depending on the measurements.",
             source.path.display()
         ));
-        standard_output::show(&document)
+        streams::show(&document)
     }
 
     fn store(&self, plan: &StepPlan) -> Result<(), Failure> {

@@ -1,7 +1,7 @@
 //! `mapper schema`.
 
 use crate::output::failure::Failure;
-use crate::output::standard_output;
+use crate::output::streams;
 use clap::Args;
 
 /// Print the JSON schema of campaign files, for editors
@@ -10,6 +10,6 @@ pub struct Schema {}
 
 impl Schema {
     pub fn run(&self) -> Result<(), Failure> {
-        standard_output::print_json(&mapper_campaign::json_schema())
+        streams::print_json(&mapper_campaign::json_schema())
     }
 }

@@ -2,5 +2,4 @@
 
 pub(crate) mod failure;
 pub(crate) mod output_options;
-pub(crate) mod standard_error;
-pub(crate) mod standard_output;
+pub(crate) mod streams;

@@ -1,6 +1,6 @@
 //! Progress on standard error: a bar, lines, or JSON.
 
-use crate::output::standard_error::say;
+use crate::output::streams::say;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mapper_core::{StepKind, StepMarker, terminal_json, terminal_text};
 use mapper_report::{progress_text, short_duration, with_messages, wrapped};
@@ -25,13 +25,9 @@ const SPINNER: &str = "{spinner} {wide_msg} {elapsed}";
 /// The consumer of the progress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProgressFormat {
-    /// A user at a terminal.
     Bar,
-    /// A file that is read later: one line per step.
     Lines,
-    /// A program: JSON lines.
     Json,
-    /// None.
     Quiet,
 }
 
@@ -49,7 +45,6 @@ impl ProgressFormat {
         }
     }
 
-    /// Whether an event is shown.
     fn shows(self, event: &SessionEvent) -> bool {
         use SessionEvent as E;
         match self {
@@ -90,7 +85,6 @@ pub struct Progress {
 
 enum Queued {
     Event(Box<SessionEvent>),
-    /// Removes the bar and acknowledges.
     Clear(SyncSender<()>),
 }
 
@@ -105,7 +99,6 @@ impl Progress {
         Progress { manner, to, stalled: AtomicBool::new(false) }
     }
 
-    /// Shows an event.
     pub fn show(&self, event: &SessionEvent) {
         if !self.manner.shows(event) {
             return;
@@ -169,11 +162,8 @@ fn show_all(manner: ProgressFormat, queued: &Receiver<Queued>) {
 
 #[derive(Default)]
 struct State {
-    /// Current style of the bar.
     template: Option<&'static str>,
-    /// Last line written to a pipe.
     last_line: String,
-    /// Start of the first piece of work.
     began: Option<Instant>,
     steps: usize,
     /// Number of the current step, from 1.
@@ -258,7 +248,6 @@ impl ProgressDisplay {
     }
 }
 
-/// Target of a step.
 fn place(marker: &StepMarker) -> String {
     marker.to.map_or_else(String::new, |point| point.in_words())
 }

@@ -1,17 +1,16 @@
-//! Standard output: the results of commands, as text or as one JSON object, and the files that they write.
+//! Standard output: results of commands as text or one JSON object, and files; standard error: messages, wrapped to the terminal.
 
 use crate::output::failure::{Code, Failure};
 use crate::output::output_options::paint;
-use crate::output::standard_error::{say, wrap_for_terminal};
 use clap::Args;
 use mapper_core::{terminal_json, terminal_text};
-use mapper_report::{Document, with_messages};
+use mapper_report::{Describe, Document, with_messages, wrapped};
 use mapper_session::{Existing, Gap, MapOut, MapWork, SessionError, write_file};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use terminal_size::terminal_size_of;
+use terminal_size::{Height, Width, terminal_size_of};
 
 /// Whether the one JSON object has been printed.
 static PRINTED: AtomicBool = AtomicBool::new(false);
@@ -82,21 +81,21 @@ pub fn show(document: &Document) -> Result<(), Failure> {
     print(&document.terminal(paint()))
 }
 
-/// Writes warnings, already formatted, to standard error.
-pub fn warn(text: &str) {
-    say(text);
+/// Writes a result as one JSON object, or as its document.
+pub fn show_result(result: &(impl Serialize + Describe), as_json: bool) -> Result<(), Failure> {
+    if as_json { print_json(result) } else { show(&result.document()) }
 }
 
 /// States that the file beside a recording was not used, and why.
 pub fn warn_of_unused(gap: &Gap) {
     if let Some(error) = &gap.not_used {
-        warn(&format!("diagnosed again: {error}\n"));
+        say(&format!("diagnosed again: {error}\n"));
     }
 }
 
 /// Writes the result of an operation on map files, and its assumptions as warnings.
 pub fn print_map_work(work: &MapWork, as_json: bool) -> Result<(), Failure> {
-    work.warnings.iter().for_each(|warning| warn(&format!("{warning}\n")));
+    work.warnings.iter().for_each(|warning| say(&format!("{warning}\n")));
     if as_json { print_json(&work.json) } else { show(&work.document) }
 }
 
@@ -111,4 +110,30 @@ pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
 /// Whether a JSON object was printed; only one is allowed.
 pub fn has_printed() -> bool {
     PRINTED.load(Ordering::Relaxed)
+}
+
+/// Writes text to standard error. A failure to write is ignored.
+pub fn say(text: &str) {
+    say_rendered(&terminal_text(text));
+}
+
+/// Writes coloured text whose file names and keys are already free of control characters.
+pub fn say_rendered(text: &str) {
+    let _ = write!(std::io::stderr().lock(), "{text}");
+}
+
+/// Wraps long lines to the width of the terminal. Without a terminal the text is unchanged, so that other programs get whole lines.
+pub fn wrap_for_terminal(text: &str, size: Option<(Width, Height)>) -> String {
+    let Some((Width(columns), _)) = size else { return text.to_owned() };
+    let columns = usize::from(columns);
+    let lines = text.split_inclusive('\n').map(|line| {
+        // Coloured lines and rows of tables have their own layout.
+        let is_prose = !line.contains('\x1b') && !line.trim().contains("   ");
+        if is_prose && line.trim_end().chars().count() > columns {
+            wrapped(line, columns, line.len() - line.trim_start().len() + 2)
+        } else {
+            line.to_owned()
+        }
+    });
+    lines.collect()
 }

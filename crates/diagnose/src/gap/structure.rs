@@ -48,8 +48,7 @@ pub(crate) fn covariance_of_errors(since_jump_s: &[f64], histories: [&[f64]; 2])
     })
 }
 
-/// Covariance of each group's error that differs from step to step, unit squared; empty if no error is declared. `slopes` are those of
-/// the predicted readings.
+/// Covariance of each group's error that differs from step to step, unit squared; empty if undeclared. `slopes`: of predicted readings.
 pub(crate) fn step_errors(study: &Study, slopes: &[f64]) -> Vec<DMatrix<f64>> {
     let sizes: [f64; OUTPUTS.len()] = std::array::from_fn(|output| {
         let ratio = structure_ratio(&study.declared, output);

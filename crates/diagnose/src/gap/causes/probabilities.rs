@@ -20,9 +20,7 @@ use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Probabilities of the causes that fit a recording.
 pub(crate) struct Posterior {
-    /// The probabilities.
     pub probabilities: CauseProbabilities,
     /// Causes for the report, best first, without supersets of a better one.
     pub candidates: Vec<Candidate>,
@@ -101,7 +99,6 @@ pub(crate) fn posterior(
     Posterior { probabilities, candidates, alike }
 }
 
-/// A cause for the report, without onsets and equivalent causes.
 pub(crate) fn candidate(
     calibration: &Calibration,
     effects: &[Arc<dyn Effect>],
@@ -119,7 +116,6 @@ pub(crate) fn candidate(
     }
 }
 
-/// Ids of a hypothesis' effects.
 pub(crate) fn ids(effects: &[Arc<dyn Effect>], hypothesis: &Hypothesis) -> Vec<String> {
     infos(effects, hypothesis).map(|info| info.id.to_string()).collect()
 }
@@ -138,8 +134,7 @@ fn onsets(study: &Study, fit: &Fit) -> BTreeMap<String, Onset> {
     begun.collect()
 }
 
-/// Parameters of effects with 95 % intervals, computed in the search coordinate so that they stay within range. `covariance`: of the search
-/// coordinates, in order.
+/// Parameters of effects with 95 % intervals, computed in search coordinates so that they stay in range; `covariance` is that of these.
 pub(crate) fn estimates(
     calibration: &Calibration,
     effects: &[Arc<dyn Effect>],
@@ -169,7 +164,6 @@ pub(crate) fn estimates(
     parameters.enumerate().map(estimate).collect()
 }
 
-/// Name of a parameter among those of all effects.
 pub(crate) fn name_of(info: &EffectInfo, parameter: &EffectParameter) -> String {
     if info.parameters.len() == 1 { info.id.to_string() } else { format!("{}.{}", info.id, parameter.name) }
 }
@@ -212,7 +206,6 @@ const ENOUGH_SHARE: f64 = 0.9;
 /// Range of the power of a size by which the length of a signature grows. Bound: roots to cubes; outside, rounding dominates.
 const POWERS: (f64, f64) = (0.6, 3.0);
 
-/// Smallest size at which a recording shows an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SmallestSize {
     /// The size as a value of the parameter; `None` if it lies outside the parameter's range.

@@ -3,8 +3,7 @@
 use crate::document::{Document, Table};
 use mapper_core::{PointBudgets, UncertaintyBudget, step_number};
 
-/// The budgets as a file: one row for each source of each number of each point. An empty cell of degrees of freedom means that the uncertainty
-/// is known exactly.
+/// The budgets as a file: a row for each source of each number. An empty cell of degrees of freedom: the uncertainty is known exactly.
 pub fn budget_csv(budgets: &[PointBudgets]) -> std::io::Result<Vec<u8>> {
     let number = |value: f64| format!("{value:e}");
     let freedom = |value: Option<f64>| value.map(|value| format!("{value:.1}")).unwrap_or_default();
@@ -82,7 +81,6 @@ pub(crate) fn budget_section(budgets: &[PointBudgets]) -> Document {
     document
 }
 
-/// One row for each step, one column for each source.
 fn budget_table(budgets: &[(usize, &UncertaintyBudget)], scale: f64) -> Table {
     let mut sources: Vec<&str> = Vec::new();
     for row in budgets.iter().flat_map(|(_, budget)| &budget.rows) {

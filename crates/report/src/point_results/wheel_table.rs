@@ -4,6 +4,7 @@ use crate::document::{Document, Table};
 use crate::formatting::{Display, number};
 use crate::point_results::points::{at_end, step_name};
 use mapper_campaign::Campaign;
+use mapper_campaign::units::Kind;
 use mapper_core::{Channel, IdentifiedPoint, Recording};
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::wheel::{MeasuredPoint, WheelCoefficients, pipe_flow};
@@ -33,7 +34,7 @@ pub(crate) fn wheel_section(
     let mut heads =
         vec!["step".to_owned(), "u2 m/s".to_owned(), "Mu2".to_owned(), "phi".to_owned(), "lambda".to_owned()];
     if has_outlet {
-        heads.extend([display.pressure_head("p2 static"), "M2".to_owned()]);
+        heads.extend([display.head("p2 static", Kind::Pressure), "M2".to_owned()]);
     }
     let mut table = Table::new(heads);
     for point in points.iter().map(|scored| &scored.point) {

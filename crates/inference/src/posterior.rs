@@ -69,8 +69,7 @@ impl Rules {
         -EXCLUDED_ODDS.ln() * self.temperature
     }
 
-    /// Probabilities of `sets`, most probable first. `none`: ln of the weight of no cause. `unmodelled`: probability of a cause that nobody
-    /// modelled.
+    /// Probabilities of `sets`, most probable first. `none`: ln of the weight of no cause; `unmodelled`: probability of an unmodelled cause.
     pub fn cause_probabilities(&self, none: f64, sets: &[CauseSet], unmodelled: f64) -> CauseProbabilities {
         let ln_weights = std::iter::once(none).chain(sets.iter().map(|set| set.ln_weight));
         let shares = shares(&ln_weights.collect::<Vec<_>>(), self.temperature);

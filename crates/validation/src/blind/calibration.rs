@@ -65,7 +65,6 @@ pub struct DiagnosisSummary {
 }
 
 impl DiagnosisSummary {
-    /// Score of the best cause minus that of no cause.
     fn margin(&self) -> f64 {
         self.candidates.iter().map(|(_, score)| *score).fold(f64::NEG_INFINITY, f64::max) - self.nothing
     }
@@ -165,9 +164,6 @@ const QUIET_SHARE: f64 = 0.985;
 const MIN_THRESHOLD: f64 = 3.0;
 
 /// The calibration that fits the observed cases, based on the shipped one.
-///
-/// # Errors
-/// [`BlindError::Signatures`] if the shipped calibration is damaged.
 pub fn fitted(observed: &[DiagnosisSummary], made_by: String) -> Result<Calibration, BlindError> {
     Ok(fit(&shipped()?, observed, made_by))
 }
@@ -318,7 +314,6 @@ fn of_width(posterior_sigma: f64, prior_sigma: f64) -> Origin {
     if posterior_sigma > MAX_WIDTH_RATIO * prior_sigma { Origin::Prior } else { Origin::Data }
 }
 
-/// A case.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Row {
     pub features: [f64; 2],
@@ -327,8 +322,7 @@ pub(crate) struct Row {
     pub weight: f64,
 }
 
-/// Offset and slopes of the logistic that separates outside causes from the others, each with its origin. `None` if one of the classes is
-/// empty.
+/// Offset and slopes of the logistic that separates outside causes, each with its origin. `None` if one of the classes is empty.
 fn logistic(rows: &[Row]) -> Option<([f64; 3], [Origin; 3])> {
     if rows.iter().all(|row| row.outside) || rows.iter().all(|row| !row.outside) {
         return None;
@@ -366,12 +360,10 @@ fn logistic(rows: &[Row]) -> Option<([f64; 3], [Origin; 3])> {
     Some((weights, origins(&weights, &curvatures(&loss, &weights))))
 }
 
-/// Range of the offset or of a slope.
 fn bounds(place: usize) -> (f64, f64) {
     if place == 0 { (-30.0, 30.0) } else { (MIN_SLOPES[place - 1], 10.0) }
 }
 
-/// Second derivatives of the loss.
 fn curvatures(loss: &dyn Fn(&[f64; 3]) -> f64, weights: &[f64; 3]) -> Matrix3<f64> {
     const STEP: f64 = 1e-3;
     Matrix3::from_fn(|i, j| {
@@ -426,8 +418,7 @@ pub(crate) fn declared(campaign: &Campaign) -> Declared {
     }
 }
 
-/// The visibility of `effects` on a recording of a schedule with noise, offsets, tolerances and weather but without a cause. Equal seeds give
-/// equal recordings; other weather changes the signatures by a few per cent.
+/// The visibility of `effects` on a recording without a cause. Equal seeds give equal recordings; weather changes it by a few per cent.
 pub(crate) fn visibility(
     campaign: &Campaign,
     schedule: &Schedule<'_>,

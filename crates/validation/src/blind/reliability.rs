@@ -1,5 +1,4 @@
-//! Reliability of the probabilities: an answer given with probability p should be right in a share p of the cases. Shares have their exact
-//! intervals.
+//! Reliability of the probabilities, with exact intervals: an answer given with probability p should be right in a share p of the cases.
 
 use crate::blind::calibration::{DiagnosisSummary, fit, shipped, weights};
 use crate::blind::cases::{BlindError, CaseKind};
@@ -69,12 +68,10 @@ pub struct Bin {
     pub effective_cases: f64,
 }
 
-/// A first answer.
 #[derive(Debug, Clone, Copy)]
 struct Answer {
     probability: f64,
     right: bool,
-    /// Weight of the case.
     weight: f64,
 }
 
@@ -122,7 +119,6 @@ fn first_answer(case: &DiagnosisSummary, calibration: &Calibration) -> Option<(f
         .max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Classes, and their expected calibration error.
 fn reliability(calibration: &str, cases: &[DiagnosisSummary], answers: &[Answer]) -> Reliability {
     let all: f64 = answers.iter().map(|answer| answer.weight).sum();
     let bins: Vec<Bin> = (0..BINS)
@@ -175,11 +171,7 @@ fn bin(index: usize, members: &[&Answer], all: f64) -> Option<Bin> {
     })
 }
 
-/// Reliability by the shipped calibration, which may have been fitted to these cases, and by a five-fold
-/// cross-validation.
-///
-/// # Errors
-/// [`BlindError::Signatures`] if the shipped calibration is damaged.
+/// Reliability by the shipped calibration, which may be fitted to these cases, and by a five-fold cross-validation.
 pub fn reliabilities(observed: &[DiagnosisSummary]) -> Result<[Reliability; 2], BlindError> {
     Ok(shipped_and_cross_validated(&shipped()?, observed))
 }

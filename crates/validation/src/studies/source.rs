@@ -36,17 +36,12 @@ impl From<StudyError> for FleetError {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CampaignSource {
-    /// The file.
     text: String,
     /// The files that it names, relative to its folder.
     files: BTreeMap<PathBuf, String>,
 }
 
 impl CampaignSource {
-    /// Reads a campaign and its files.
-    ///
-    /// # Errors
-    /// [`FleetError::Kind`] with all mistakes of the campaign, or if its rig is not simulated.
     pub fn read(path: &Path, registry: &Registry) -> Result<(CampaignSource, Campaign), FleetError> {
         // All mistakes, as every other command reports them.
         let campaign = load(path).map_err(FleetError::kind)?;

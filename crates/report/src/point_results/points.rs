@@ -196,8 +196,7 @@ fn with_truth(points: &[ScoredPoint], truth: bool) -> bool {
     truth && points.iter().any(|scored| scored.truth.is_some())
 }
 
-/// The points of the map by speed line from surge to choke, followed by the points outside it; without repeats, which serve only
-/// for comparison. With their true efficiency if `truth` is set and it is known. It fits a terminal.
+/// The points by speed line from surge to choke, then those outside the map; without repeats. With true efficiencies if `truth` and known.
 pub(crate) fn points_by_line(
     points: &[ScoredPoint],
     map: Option<&CompressorMap>,

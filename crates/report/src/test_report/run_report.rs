@@ -5,13 +5,12 @@ use crate::document::{Document, Table};
 use crate::formatting::{Display, Message, duration};
 use crate::page::widgets::{OtherRun, map_widget, plan_widget, step_widget};
 use crate::plan::plan_document::{avoided_time, executed_plan_table};
-use crate::point_results::budget_table::budget_section;
+use crate::point_results::point_tables::{budget_section, wheel_section};
 use crate::point_results::point_warnings::doubts;
 use crate::point_results::points::{
     END_S, allowance_sentence, disagreement_text, point_tables, shared_errors_text, verdict_sentence,
 };
 use crate::point_results::summary::{PointResults, score_sentences};
-use crate::point_results::wheel_table::wheel_section;
 use crate::test_report::conditions::{
     JudgedPoints, acceptance_section, balance_section, condition_table, instruments_section, witness_table,
 };

@@ -14,8 +14,8 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser};
 use mapper_core::terminal_text;
 use output::failure::{Code, Failure};
-use output::streams::say;
-use output::{output_options, streams};
+use output::standard_error::say;
+use output::{output_options, standard_output};
 use serde_json::json;
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, set_hook};
@@ -72,9 +72,9 @@ fn explain_defects() {
 /// Prints the failure, with `--json` as an object if none was printed yet.
 fn failed(failure: &Failure) -> ExitCode {
     let Some(code) = failure.report() else { return ExitCode::SUCCESS };
-    if output_options::json() && !streams::has_printed() {
+    if output_options::json() && !standard_output::has_printed() {
         // If the reader has closed the pipe, the text is lost.
-        let _ = streams::print_json(&failure.json());
+        let _ = standard_output::print_json(&failure.json());
     }
     code
 }
@@ -101,7 +101,7 @@ fn wrong_arguments(mut error: clap::Error, json: bool) -> ExitCode {
     if json {
         let mut parts = text.trim_start_matches("error: ").splitn(2, "\n\n").map(str::trim);
         let value = json!({ "code": 2, "message": parts.next(), "help": parts.next() });
-        let _ = streams::print_json(&value);
+        let _ = standard_output::print_json(&value);
     }
     ExitCode::from(2)
 }

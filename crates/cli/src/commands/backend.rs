@@ -2,7 +2,7 @@
 
 use crate::environment::{registry, rig_states_directory};
 use crate::output::failure::{Code, Failure};
-use crate::output::streams;
+use crate::output::standard_output;
 use clap::{Args, Subcommand};
 use mapper_core::{RigMode, Setpoints};
 use mapper_driver_host::conformance::{Candidate, check_rules};
@@ -69,7 +69,7 @@ impl Backend {
             )
             .collect();
         if self.json {
-            return streams::print_json(&json!({ "backends": backends }));
+            return standard_output::print_json(&json!({ "backends": backends }));
         }
         let mut table = mapper_report::Table::new(["backend", "summary"]).with_texts([1]);
         for entry in &backends {
@@ -85,7 +85,7 @@ impl Backend {
         }
         let mut document = mapper_report::Document::default();
         document.table(table);
-        streams::show(&document)
+        standard_output::show(&document)
     }
 
     fn check(&self, name: &str, path: &Path) -> Result<(), Failure> {
@@ -142,13 +142,13 @@ impl Backend {
             let rules = results.iter().map(
                 |(rule, kept)| json!({"rule": rule, "kept": kept.is_ok(), "found": kept.as_ref().err()}),
             );
-            streams::print_json(&json!({"backend": name, "rules": rules.collect::<Vec<_>>()}))?;
+            standard_output::print_json(&json!({"backend": name, "rules": rules.collect::<Vec<_>>()}))?;
         } else {
             let lines = results.iter().map(|(rule, kept)| match kept {
                 Ok(()) => format!("kept    {rule}\n"),
                 Err(finding) => format!("BROKEN  {rule}: {finding}\n"),
             });
-            streams::print(&lines.collect::<String>())?;
+            standard_output::print(&lines.collect::<String>())?;
         }
         match broken {
             0 => Ok(()),

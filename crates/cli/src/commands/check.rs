@@ -3,7 +3,7 @@
 use crate::environment::{registry, today};
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
-use crate::output::{output_options, streams};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_campaign::CampaignError;
 use mapper_campaign::campaign::Date;
@@ -35,7 +35,7 @@ impl Check {
                 let omitted = findings.omitted;
                 let mut mistakes = Failure::of_campaign(CampaignError::Mistakes(findings)).json();
                 (mistakes["campaign"], mistakes["omitted"]) = (json!(null), json!(omitted));
-                streams::print_json(&mistakes)?;
+                standard_output::print_json(&mistakes)?;
                 return Err(Failure::printed(Code::BadInput));
             }
             Err(error) => return Err(Failure::of_campaign(error)),
@@ -54,7 +54,7 @@ impl Check {
         let warnings = mapper_campaign::warnings(&text, &self.campaign, &campaign, forecast.concerns);
         let lines = mapper_campaign::resolved_lines(&campaign, &model);
         if self.json {
-            return streams::print_json(&json!({
+            return standard_output::print_json(&json!({
                 "campaign": campaign.name,
                 "points": campaign.points.len(),
                 "lines": lines,
@@ -71,9 +71,9 @@ impl Check {
             }));
         }
         if warnings.count() > 0 {
-            streams::say(&warnings.render(output_options::is_stderr_coloured()));
+            standard_output::say(&warnings.render(output_options::is_stderr_coloured()));
         }
-        streams::show(
+        standard_output::show(
             &CheckedCampaign {
                 file: &self.campaign,
                 campaign: &campaign,

@@ -4,7 +4,7 @@ use crate::commands::run::{ending_failure, expand_home};
 use crate::environment::{SystemClock, registry, rig_states_directory, today};
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
-use crate::output::{output_options, streams};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_campaign::{actuator_lines, read_named_file, with_actuators};
 use mapper_core::{PacedClock, UnpacedClock};
@@ -66,11 +66,11 @@ impl Commission {
             .prepare_commissioning(&commissioning, request)
             .map_err(|error| Failure::in_campaign(error, &self.campaign))?;
         if !as_json {
-            streams::show(&plan_document(&commissioning.campaign, prepared.plan()))?;
+            standard_output::show(&plan_document(&commissioning.campaign, prepared.plan()))?;
         }
         if self.dry_run {
             let dry_run = || json!({"dry_run": true, "rig": prepared.rig(), "plan": prepared.plan()});
-            return if as_json { streams::print_json(&with_messages(dry_run)) } else { Ok(()) };
+            return if as_json { standard_output::print_json(&with_messages(dry_run)) } else { Ok(()) };
         }
         stop.enter(Phase::Rig);
         let (_, run) = match prepared.rig().simulated_time {
@@ -95,11 +95,11 @@ impl Commission {
             let actuators = commissioning_json(&values);
             let run =
                 json!({"run": directory, "recording": recording, "lines": lines, "actuators": actuators});
-            streams::print_json(&run)?;
+            standard_output::print_json(&run)?;
         } else {
-            streams::show(&commissioning_document(&values))?;
+            standard_output::show(&commissioning_document(&values))?;
             if !self.write && !different.is_empty() {
-                streams::print(&format!("\n{lines}"))?;
+                standard_output::print(&format!("\n{lines}"))?;
             }
         }
         if self.write && !different.is_empty() {
@@ -123,7 +123,7 @@ impl Commission {
         if as_json {
             return Ok(());
         }
-        streams::print(&format!("\n{}:\n{}", path.display(), difference(text, &changed)))
+        standard_output::print(&format!("\n{}:\n{}", path.display(), difference(text, &changed)))
     }
 }
 

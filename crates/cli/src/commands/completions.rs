@@ -1,7 +1,7 @@
 //! `mapper completions`.
 
 use crate::output::failure::Failure;
-use crate::output::{output_options, streams};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use clap_complete::Shell;
 
@@ -16,6 +16,6 @@ impl Completions {
     pub fn run(&self) -> Result<(), Failure> {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut output_options::commands(), "mapper", &mut script);
-        streams::print(&String::from_utf8_lossy(&script))
+        standard_output::print(&String::from_utf8_lossy(&script))
     }
 }

@@ -3,7 +3,7 @@
 use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::{Code, Failure};
-use crate::output::streams::{self, FileOutput};
+use crate::output::standard_output::{self, FileOutput};
 use clap::Args;
 use mapper_report::{Describe, corrected_csv};
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, Session, SessionError, Versioned};
@@ -52,12 +52,12 @@ impl Drift {
                 value["sensors"] = json!(drift.sensors);
             }
             value["recording_warnings"] = json!(warnings);
-            return streams::print_json(&value);
+            return standard_output::print_json(&value);
         }
         let mut document = drift.report.document();
         document.append(drift.sensors.document());
         document.append(drift.zero.document());
         warnings.iter().for_each(|warning| document.text(format!("recording: {warning}")));
-        streams::show(&document)
+        standard_output::show(&document)
     }
 }

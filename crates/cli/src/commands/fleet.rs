@@ -3,7 +3,7 @@
 use crate::command_line::subcommands;
 use crate::environment::{with_fleet, with_machine};
 use crate::output::failure::{Code, Failure};
-use crate::output::{output_options, streams};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_fleet::{
     CreatedStudy, Hash, ItemSelection, Limits, MergeOutcome, Shard, SubmitOptions, Template, kind_of,
@@ -56,7 +56,7 @@ impl Estimate {
         let tried = with_fleet(&self.directory, None, |fleet, kind, engine, machine| {
             fleet.estimate_cost(kind, self.tries.into(), engine, machine)
         })?;
-        streams::show_result(&tried.cost, self.json)
+        standard_output::show_result(&tried.cost, self.json)
     }
 }
 
@@ -86,7 +86,7 @@ impl Make {
             let items = made.fleet.study.items.len();
             if self.json {
                 let (new, gone) = (made.new, made.gone);
-                return streams::print_json(
+                return standard_output::print_json(
                     &json!({ "directory": self.out, "items": items, "new": new, "gone": gone }),
                 );
             }
@@ -95,7 +95,7 @@ impl Make {
             } else {
                 format!(", {} of them new; {} were removed", made.new, made.gone)
             };
-            streams::print(&format!(
+            standard_output::print(&format!(
                 "{items} items in {dir}{changed}\nEstimate their cost: mapper fleet estimate {dir}\n",
                 dir = self.out.display()
             ))
@@ -135,9 +135,9 @@ pub fn print_merged(
 ) -> Result<(), Failure> {
     if json {
         let result = merged.result.as_ref().map(|(path, _)| path);
-        streams::print_json(&json!({ "status": merged.status, "result": result }))?;
+        standard_output::print_json(&json!({ "status": merged.status, "result": result }))?;
     } else {
-        streams::show(&merged.document())?;
+        standard_output::show(&merged.document())?;
     }
     if is_complete {
         return Ok(());
@@ -158,7 +158,7 @@ pub struct Retry {
 impl Retry {
     pub fn run(&self) -> Result<(), Failure> {
         let submission = with_fleet(&self.directory, None, |fleet, _, _, machine| fleet.retry(machine))?;
-        streams::show_result(&submission, self.json)
+        standard_output::show_result(&submission, self.json)
     }
 }
 
@@ -209,10 +209,10 @@ impl Status {
             let fleet = mapper_fleet::Fleet::open(&self.directory, &program(registry))?;
             if self.items {
                 if self.json {
-                    return streams::print_json(&json!({ "items": fleet.study.items }));
+                    return standard_output::print_json(&json!({ "items": fleet.study.items }));
                 }
                 let line = |item: &mapper_fleet::ItemEntry| format!("{}  {}\n", item.hash, item.name);
-                return streams::print(&fleet.study.items.iter().map(line).collect::<String>());
+                return standard_output::print(&fleet.study.items.iter().map(line).collect::<String>());
             }
             let status = fleet.status();
             // The queue is queried only if items are unfinished, and with a time limit.
@@ -222,11 +222,11 @@ impl Status {
             });
             if self.json {
                 let left_s = status.left_s();
-                return streams::print_json(
+                return standard_output::print_json(
                     &json!({ "study": fleet.study.name, "status": status, "core_s_left": left_s, "queue": states }),
                 );
             }
-            streams::show(&study_status(&fleet.study.name, &status, states.as_ref()))
+            standard_output::show(&study_status(&fleet.study.name, &status, states.as_ref()))
         })
     }
 }
@@ -293,7 +293,7 @@ impl Submit {
             let cost = fleet.estimate_cost(kind, TRIAL_ITEMS, engine, machine)?.cost;
             fleet.submit(&options, &cost, machine)
         })?;
-        streams::show_result(&submission, self.json)
+        standard_output::show_result(&submission, self.json)
     }
 }
 
@@ -340,14 +340,14 @@ impl Work {
                 fleet.work(kind, which, self.again, engine, machine)
             })?;
         if self.json {
-            streams::print_json(
+            standard_output::print_json(
                 &json!({ "done": outcome.done, "there": outcome.already_done, "failed": outcome.failed }),
             )?;
         } else {
             let failed = outcome.failed.iter().map(|(name, why)| format!("failed: {name}: {why}\n"));
             let failed: String = failed.collect();
             let (done, there) = (outcome.done, outcome.already_done);
-            streams::print(&format!("{failed}{done} done, {there} were already done\n"))?;
+            standard_output::print(&format!("{failed}{done} done, {there} were already done\n"))?;
         }
         if outcome.failed.is_empty() {
             return Ok(());

@@ -1,7 +1,7 @@
 //! `mapper history`: results of the nightly runs.
 
 use crate::output::failure::Failure;
-use crate::output::streams::{self, FileOutput};
+use crate::output::standard_output::{self, FileOutput};
 use clap::Args;
 use mapper_history::{Filter, Metric};
 use mapper_report::{history_svg, listed_runs, night_groups};
@@ -78,8 +78,12 @@ impl History {
         }
         if self.output.json {
             let runs: Vec<serde_json::Value> = runs.iter().map(mapper_report::listed_run_json).collect();
-            return streams::print_json(&json!({"history": self.db, "runs": runs}));
+            return standard_output::print_json(&json!({"history": self.db, "runs": runs}));
         }
-        streams::show(&if self.runs { listed_runs(&runs, &figures) } else { night_groups(&runs, &figures) })
+        standard_output::show(&if self.runs {
+            listed_runs(&runs, &figures)
+        } else {
+            night_groups(&runs, &figures)
+        })
     }
 }

@@ -3,7 +3,7 @@
 use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::output::streams;
+use crate::output::standard_output;
 use crate::terminal::{DetailLevel, identified_text, results_text};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
@@ -52,17 +52,23 @@ impl Identify {
         if let Some(directory) = &self.out {
             let results = session.identify_into(recorded, &map, method, directory)?;
             return match self.json {
-                true => streams::print_json(&results),
-                false => streams::show(&results_text(&display, &results, FULL_COMMAND, self.shown)),
+                true => standard_output::print_json(&results),
+                false => standard_output::show(&results_text(&display, &results, FULL_COMMAND, self.shown)),
             };
         }
         let identified = session.identify(recorded, &map, method)?;
         identified.has_points(&warnings)?;
         match self.json {
-            true => streams::print_json(&with_messages(|| identified.json(path.as_deref(), &warnings))),
-            false => {
-                streams::show(&identified_text(&display, &identified, FULL_COMMAND, &warnings, self.shown))
+            true => {
+                standard_output::print_json(&with_messages(|| identified.json(path.as_deref(), &warnings)))
             }
+            false => standard_output::show(&identified_text(
+                &display,
+                &identified,
+                FULL_COMMAND,
+                &warnings,
+                self.shown,
+            )),
         }
     }
 }

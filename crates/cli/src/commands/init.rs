@@ -3,7 +3,7 @@
 use crate::command_line::reference;
 use crate::environment::registry;
 use crate::output::failure::{Code, Failure};
-use crate::output::streams;
+use crate::output::standard_output;
 use clap::{Args, ValueEnum};
 use mapper_campaign::units::{Kind, parse};
 use mapper_session::{FirstCampaignRequest, FirstRig, first_campaign};
@@ -97,8 +97,8 @@ impl Init {
         };
         let written = first_campaign(&registry(), &request)?;
         match self.json {
-            true => streams::print_json(&written),
-            false => streams::show(&mapper_report::first_campaign(
+            true => standard_output::print_json(&written),
+            false => standard_output::show(&mapper_report::first_campaign(
                 &written.campaign,
                 &written.map,
                 written.channels.as_deref(),
@@ -115,7 +115,7 @@ fn ask_wheel_diameter_m() -> Result<f64, Failure> {
     if !std::io::stdin().is_terminal() {
         return Err(missing("the diameter of the compressor wheel is required"));
     }
-    streams::say("Diameter of the compressor's wheel at its exit, mm: ");
+    standard_output::say("Diameter of the compressor's wheel at its exit, mm: ");
     let mut line = String::new();
     // Limited, because a diameter has only a few characters.
     let read = std::io::stdin().lock().take(64).read_line(&mut line);

@@ -3,7 +3,7 @@
 use crate::command_line::{key_and_value, subcommands};
 use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::output::streams::{self, FileOutput};
+use crate::output::standard_output::{self, FileOutput};
 use clap::Args;
 use mapper_recording::ChannelMap;
 use mapper_report::{Document, log_contents, with_messages};
@@ -53,14 +53,14 @@ impl Inspect {
             self.output.write(file, log.channel_map().as_bytes())?;
         }
         if self.output.json {
-            return streams::print_json(&with_messages(|| log.json()));
+            return standard_output::print_json(&with_messages(|| log.json()));
         }
         let mut document = log_contents(log.format, &log.layout, &log.survey, &log.proposal);
         document.text(match &self.write_channels {
             Some(file) => format!("The channel map is in {}.", file.display()),
             None => "Save it with `--write-channels FILE`.".to_owned(),
         });
-        streams::show(&document)
+        standard_output::show(&document)
     }
 }
 
@@ -83,7 +83,7 @@ impl Convert {
         let map = self.channels.as_deref().map_or_else(|| Ok(ChannelMap::native()), channel_map)?;
         let converted = convert_recording(&registry(), &self.log, &map, (&self.out, self.output.existing()))?;
         if self.output.json {
-            return streams::print_json(&converted);
+            return standard_output::print_json(&converted);
         }
         let Converted { file, channels, rows, steps, duration_s, warnings } = converted;
         let mut document = Document::default();
@@ -93,6 +93,6 @@ impl Convert {
             file.display(),
             channels.join(", ")
         ));
-        streams::show(&document)
+        standard_output::show(&document)
     }
 }

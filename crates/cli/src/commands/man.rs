@@ -1,7 +1,7 @@
 //! `mapper man`.
 
 use crate::output::failure::{Code, Failure};
-use crate::output::{output_options, streams};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -24,9 +24,9 @@ impl Man {
         std::fs::create_dir_all(&self.out).map_err(failed)?;
         clap_mangen::generate_to(output_options::commands(), &self.out).map_err(failed)?;
         if self.json {
-            streams::print_json(&json!({ "directory": self.out }))
+            standard_output::print_json(&json!({ "directory": self.out }))
         } else {
-            streams::print(&format!("manual pages in {}\n", self.out.display()))
+            standard_output::print(&format!("manual pages in {}\n", self.out.display()))
         }
     }
 }

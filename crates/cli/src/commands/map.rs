@@ -3,7 +3,7 @@
 use crate::command_line::{MapReading, RecordingReading, reference, subcommands};
 use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::output::streams::{self, FileOutput, MapTarget};
+use crate::output::standard_output::{self, FileOutput, MapTarget};
 use clap::Args;
 use mapper_core::EfficiencyDefinition;
 use mapper_maps::MapFitOptions;
@@ -66,7 +66,7 @@ impl Compare {
         let picture = self.picture.as_deref().map(|path| (path, self.output.existing()));
         let maps = [(self.first.as_path(), &first), (self.second.as_path(), &second)];
         let work = registry().compare_map_files(maps, picture)?;
-        streams::print_map_work(&work, self.output.json)
+        standard_output::print_map_work(&work, self.output.json)
     }
 }
 
@@ -103,7 +103,7 @@ impl Convert {
         let description = self.reading.description()?;
         let registry = registry();
         let work = registry.convert_map_file(&self.map, &description, out, to_reference, efficiencies)?;
-        streams::print_map_work(&work, self.output.json)
+        standard_output::print_map_work(&work, self.output.json)
     }
 }
 
@@ -136,7 +136,7 @@ impl Fit {
         };
         let description = self.reading.description()?;
         let work = registry().fit_map_file(&self.map, &description, &options, self.target.map())?;
-        streams::print_map_work(&work, self.target.output.json)
+        standard_output::print_map_work(&work, self.target.output.json)
     }
 }
 
@@ -171,10 +171,10 @@ impl Fmu {
             session.identified_fmu(recorded, &map, self.compile, &self.out, existing)?
         };
         if self.output.json {
-            return streams::print_json(&written);
+            return standard_output::print_json(&written);
         }
         let library = written.binary.as_deref().unwrap_or("none; the importer compiles the sources");
-        streams::print(&format!(
+        standard_output::print(&format!(
             "{}\norigin     {}\nstart      {:.0} rpm\nlibrary    {library}\n",
             written.file.display(),
             written.origin,
@@ -201,7 +201,7 @@ impl Inspect {
     pub fn run(&self) -> Result<(), Failure> {
         let description = self.write_description.as_deref().map(|file| (file, self.output.existing()));
         let work = registry().inspect_map_file(&self.map, &self.reading.description()?, description)?;
-        streams::print_map_work(&work, self.output.json)
+        standard_output::print_map_work(&work, self.output.json)
     }
 }
 
@@ -237,7 +237,7 @@ impl Reduce {
         } else {
             registry.reduce_points(&self.points, &description, machine, target.map(), budget)?
         };
-        streams::print_map_work(&work, target.output.json)
+        standard_output::print_map_work(&work, target.output.json)
     }
 }
 
@@ -264,9 +264,9 @@ impl Rig {
         let recorded = Recorded::read_run(&registry, &self.recording, &map, given.as_ref())?;
         let written = Session::new(&registry).rig_files(recorded, &map, &self.out)?;
         if self.json {
-            return streams::print_json(&written);
+            return standard_output::print_json(&written);
         }
         let lines: String = written.files.iter().map(|path| format!("{}\n", path.display())).collect();
-        streams::print(&lines)
+        standard_output::print(&lines)
     }
 }

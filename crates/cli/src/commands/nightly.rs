@@ -3,7 +3,7 @@
 use crate::environment::registry;
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
-use crate::output::{output_options, streams};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_campaign::load_nightly;
 use mapper_history::{History, Night};
@@ -75,15 +75,15 @@ impl Nightly {
             // The figures exist only here.
             Err(error) => {
                 if self.json {
-                    streams::print_json(&json!({"night": night}))?;
+                    standard_output::print_json(&json!({"night": night}))?;
                 } else {
-                    streams::show(&night_runs(&night, false))?;
+                    standard_output::show(&night_runs(&night, false))?;
                 }
                 return Err(SessionError::from(error).into());
             }
         };
         if self.json {
-            streams::print_json(&json!({
+            standard_output::print_json(&json!({
                 "history": path,
                 "report": night_report_path(&path, night.started_ms),
                 "night": night,
@@ -91,7 +91,7 @@ impl Nightly {
                 "quiet": comparison.is_quiet(),
             }))?;
         } else {
-            streams::show(&night_comparison(&night, &comparison, &path))?;
+            standard_output::show(&night_comparison(&night, &comparison, &path))?;
         }
         write_night_report(&path, &night, &comparison)?;
         if comparison.is_quiet() || (self.accept && comparison.failed.is_empty()) {

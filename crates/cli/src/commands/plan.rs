@@ -3,7 +3,7 @@
 use crate::environment::registry;
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
-use crate::output::streams::{self, FileOutput};
+use crate::output::standard_output::{self, FileOutput};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
@@ -73,9 +73,9 @@ impl Plan {
         if let [from, to] = self.why.as_slice() {
             let jump = mapper_planner::explain_jump(&request, *from, *to).map_err(SessionError::from)?;
             return if self.output.json {
-                streams::print_json(&jump_json(&jump))
+                standard_output::print_json(&jump_json(&jump))
             } else {
-                streams::show(&jump_forecast(&campaign, &jump))
+                standard_output::show(&jump_forecast(&campaign, &jump))
             };
         }
         let appended = self.append.first().zip(self.append.get(1)).map(|(&from, &to)| Jump { from, to });
@@ -96,11 +96,11 @@ impl Plan {
             if let Some(others) = &others {
                 value["comparison"] = comparison_json(&plan, others);
             }
-            return streams::print_json(&value);
+            return standard_output::print_json(&value);
         }
         let mut document = plan_document(&campaign, &plan);
         document.append(others.map(|others| plan_comparison(&plan, &others)).unwrap_or_default());
-        streams::show(&document)
+        standard_output::show(&document)
     }
 
     /// Rehearses a script and prints the forecast plan.
@@ -121,7 +121,7 @@ impl Plan {
             let mut value = plan_json(campaign, &plan)?;
             value["forecast"] = true.into();
             value["notes"] = notes.into();
-            return streams::print_json(&value);
+            return standard_output::print_json(&value);
         }
         let mut document = plan_document(campaign, &plan);
         notes.into_iter().for_each(|note| document.text(format!("note: {note}")));
@@ -129,7 +129,7 @@ impl Plan {
             "Forecast: the script {} was rehearsed on the nominal machine; on the rig it may take other steps, depending on the measurements.",
             source.path.display()
         ));
-        streams::show(&document)
+        standard_output::show(&document)
     }
 
     fn store(&self, plan: &StepPlan) -> Result<(), Failure> {

@@ -4,8 +4,8 @@ use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
-use crate::output::streams::FileOutput;
-use crate::output::{output_options, streams};
+use crate::output::standard_output::FileOutput;
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_recording::ChannelMap;
 use mapper_session::{Gap, Recorded, Registry, Session, SessionError, page_as_pdf};
@@ -65,10 +65,10 @@ impl Report {
             replace.write(&files[1].1, &pdf)?;
         }
         if self.output.json {
-            return streams::print_json(&files.into_iter().collect::<BTreeMap<_, _>>());
+            return standard_output::print_json(&files.into_iter().collect::<BTreeMap<_, _>>());
         }
         let line = |(what, path): &(&str, PathBuf)| format!("{what:<11}{}\n", path.display());
-        streams::print(&files.iter().map(line).collect::<String>())
+        standard_output::print(&files.iter().map(line).collect::<String>())
     }
 }
 
@@ -82,6 +82,6 @@ fn diagnose(file: &Path, registry: &Registry, recorded: &Recorded, map: &Channel
     let gap = session.gap(recorded, (&campaign, map), effects, None);
     progress.clear();
     let gap = gap?;
-    streams::warn_of_unused(&gap);
+    standard_output::warn_of_unused(&gap);
     Ok(gap)
 }

@@ -1,7 +1,7 @@
 //! `mapper reproduce`: the paper's figures on the nominal model.
 
 use crate::output::failure::{Code, Failure};
-use crate::output::{output_options, streams};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_validation::reproduction::{FIGURES, picture_path};
 use serde_json::json;
@@ -45,7 +45,7 @@ impl Reproduce {
         if self.json {
             let figures: Vec<serde_json::Value> =
                 results.iter().map(mapper_validation::reproduction::figure_json).collect();
-            return streams::print_json(&json!({"page": page, "figures": figures}));
+            return standard_output::print_json(&json!({"page": page, "figures": figures}));
         }
         let mut text = String::new();
         for result in &results {
@@ -59,7 +59,7 @@ impl Reproduce {
                 ));
             }
         }
-        streams::print(&format!("{text}\n{}\n", page.display()))
+        standard_output::print(&format!("{text}\n{}\n", page.display()))
     }
 }
 

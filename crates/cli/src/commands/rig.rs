@@ -3,7 +3,7 @@
 use crate::commands::commission::Commission;
 use crate::environment::rig_states_directory;
 use crate::output::failure::Failure;
-use crate::output::streams;
+use crate::output::standard_output;
 use clap::{Args, Subcommand};
 use mapper_session::{RigStates, RigStatus, since_text};
 use std::path::PathBuf;
@@ -46,25 +46,25 @@ impl Rig {
             RigCommand::Acknowledge { rig } => (states.acknowledge(rig)?, true),
         };
         if self.json {
-            return streams::print_json(&status);
+            return standard_output::print_json(&status);
         }
         let text = status_text(&status, cleared);
         if status.owner.is_some() || status.latch.is_some() {
-            return streams::print(&text);
+            return standard_output::print(&text);
         }
         // A mistyped name would otherwise look like a rig that is not in use.
         let known: Vec<String> = states.list().into_iter().map(|status| status.rig).collect();
         let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-        streams::print(&format!("{text}rigs used so far: {known}\n"))
+        standard_output::print(&format!("{text}rigs used so far: {known}\n"))
     }
 
     fn print_all(&self, known: &[RigStatus]) -> Result<(), Failure> {
         if self.json {
-            return streams::print_json(&serde_json::json!({"rigs": known}));
+            return standard_output::print_json(&serde_json::json!({"rigs": known}));
         }
         let lines: String = known.iter().map(|status| status_text(status, false)).collect();
         let none = "no rig has been used so far\n";
-        streams::print(if lines.is_empty() { none } else { &lines })
+        standard_output::print(if lines.is_empty() { none } else { &lines })
     }
 }
 

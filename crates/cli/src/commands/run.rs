@@ -3,7 +3,7 @@
 use crate::environment::{SystemClock, registry, rig_states_directory, today};
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
-use crate::output::{output_options, streams};
+use crate::output::{output_options, standard_output};
 use crate::terminal::{DetailLevel, results_text};
 use clap::Args;
 use mapper_campaign::Campaign;
@@ -125,8 +125,8 @@ impl Run {
         };
         if let Some(live) = &live {
             live.start(&live_run).map_err(Failure::of_live)?;
-            live.warning().iter().for_each(|warning| streams::say(&format!("warning: {warning}\n")));
-            streams::say(&format!("live page: {}\n", live.url()));
+            live.warning().iter().for_each(|warning| standard_output::say(&format!("warning: {warning}\n")));
+            standard_output::say(&format!("live page: {}\n", live.url()));
         }
         let outcome = match pace {
             Some(pace) => {
@@ -168,7 +168,7 @@ impl Run {
             (Err(error), None) => return Err(error.into()),
             (Ok(results), _) if !self.json => {
                 let full_command = format!("`mapper identify {} --full`", results.run.display());
-                streams::show(&results_text(&campaign.display, &results, &full_command, self.shown))?;
+                standard_output::show(&results_text(&campaign.display, &results, &full_command, self.shown))?;
             }
             // Without results, only the reason for the stop matters.
             (Err(_), Some(_)) if !self.json => {}
@@ -182,7 +182,7 @@ impl Run {
                 if let Some(failure) = failure {
                     value["failure"] = failure.json();
                 }
-                streams::print_json(&value)?;
+                standard_output::print_json(&value)?;
             }
         }
         failure.map_or(Ok(()), Err)
@@ -201,7 +201,7 @@ impl Run {
                     "plan": plan,
                 })
             };
-            return streams::print_json(&with_messages(dry_run));
+            return standard_output::print_json(&with_messages(dry_run));
         }
         let samples = (soak_s(campaign) + plan.duration_s()) * rig.sample_rate_hz;
         let mut document = plan_document(campaign, plan);
@@ -214,7 +214,7 @@ impl Run {
             rig.sample_rate_hz,
             would_write.display(),
         ));
-        streams::show(&document)
+        standard_output::show(&document)
     }
 }
 

@@ -1,7 +1,7 @@
 //! `mapper schema`.
 
 use crate::output::failure::Failure;
-use crate::output::streams;
+use crate::output::standard_output;
 use clap::Args;
 
 /// Print the JSON schema of campaign files, for editors
@@ -10,6 +10,6 @@ pub struct Schema {}
 
 impl Schema {
     pub fn run(&self) -> Result<(), Failure> {
-        streams::print_json(&mapper_campaign::json_schema())
+        standard_output::print_json(&mapper_campaign::json_schema())
     }
 }

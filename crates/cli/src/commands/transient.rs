@@ -3,7 +3,7 @@
 use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::output::streams::{self, FileOutput};
+use crate::output::standard_output::{self, FileOutput};
 use clap::Args;
 use mapper_report::Describe;
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, Session, Side, Versioned, write_transient};
@@ -52,11 +52,14 @@ impl Transient {
             None => Vec::new(),
         };
         if self.output.json {
-            return streams::print_json(&Versioned { format_version: DIAGNOSIS_FORMAT, content: &diagnosis });
+            return standard_output::print_json(&Versioned {
+                format_version: DIAGNOSIS_FORMAT,
+                content: &diagnosis,
+            });
         }
         let mut document = diagnosis.document();
         recorded.read.warnings.iter().for_each(|warning| document.text(format!("recording: {warning}")));
         files.iter().for_each(|file| document.text(file.display().to_string()));
-        streams::show(&document)
+        standard_output::show(&document)
     }
 }

@@ -1,7 +1,7 @@
 //! Failures of commands: message, remedy, and exit code.
 
 use crate::output::output_options;
-use crate::output::streams::{say, say_rendered, wrap_for_terminal};
+use crate::output::standard_error::{say, say_rendered, wrap_for_terminal};
 use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::{ExportError, ImportError};
 use mapper_fleet::{FleetError, StudyFileError};

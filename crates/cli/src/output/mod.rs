@@ -2,4 +2,5 @@
 
 pub(crate) mod failure;
 pub(crate) mod output_options;
-pub(crate) mod streams;
+pub(crate) mod standard_error;
+pub(crate) mod standard_output;

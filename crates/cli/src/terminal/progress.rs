@@ -1,6 +1,6 @@
 //! Progress on standard error: a bar, lines, or JSON.
 
-use crate::output::streams::say;
+use crate::output::standard_error::say;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mapper_core::{StepKind, StepMarker, terminal_json, terminal_text};
 use mapper_report::{progress_text, short_duration, with_messages, wrapped};
@@ -75,8 +75,7 @@ const SEND_TIMEOUT: Duration = Duration::from_millis(10);
 /// Longest wait at the end for the queued events to be shown.
 const FLUSH_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Shows the events of a session. Many threads may send them; a separate thread shows them, so no sender waits for a terminal
-/// or a pipe. A terminal on hold (Ctrl-S) or a pipe without a reader loses lines; the run and its guards continue.
+/// Shows events on its own thread: no sender waits for a terminal or pipe. One that is held or unread loses lines; the run goes on.
 pub struct Progress {
     manner: ProgressFormat,
     to: SyncSender<Queued>,

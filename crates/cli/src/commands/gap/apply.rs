@@ -2,7 +2,7 @@
 
 use crate::environment::registry;
 use crate::output::failure::{Code, Failure};
-use crate::output::streams;
+use crate::output::standard_output;
 use clap::Args;
 use mapper_report::Document;
 use mapper_session::{CalibratedModel, calibrated_model_campaign, found_in, write_new};
@@ -35,6 +35,6 @@ impl Apply {
         let mut document = Document::default();
         document.text(format!("campaign with the diagnosed machine: {}", self.out.display()));
         document.text(found.doubt.map(|doubt| format!("warning: {doubt}")).unwrap_or_default());
-        streams::show(&document)
+        standard_output::show(&document)
     }
 }

@@ -4,7 +4,7 @@ use crate::command_line::subcommands;
 use crate::environment::registry;
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
-use crate::output::{output_options, streams};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_fleet::{Engine, cores};
 use mapper_report::{Document, Table};
@@ -91,13 +91,13 @@ impl Make {
         progress.clear();
         let made = made?;
         if self.json {
-            return streams::print_json(&json!({
+            return standard_output::print_json(&json!({
                 "directory": self.out,
                 "cases": made.manifest.cases,
                 "answers_sha256": made.manifest.answers_sha256,
             }));
         }
-        streams::print(&format!(
+        standard_output::print(&format!(
             "{} cases in {}\nSHA-256 of the answers: {}\n",
             made.manifest.cases.len(),
             self.out.display(),
@@ -142,10 +142,12 @@ impl Run {
         let failed: Vec<String> = diagnosed.into_iter().filter_map(Result::err).collect();
         if failed.is_empty() {
             if self.json {
-                return streams::print_json(&json!({ "cases": manifest.cases, "directory": self.directory }));
+                return standard_output::print_json(
+                    &json!({ "cases": manifest.cases, "directory": self.directory }),
+                );
             }
             let (cases, directory) = (manifest.cases.len(), self.directory.display());
-            return streams::print(&format!("{cases} diagnoses in {directory}\n"));
+            return standard_output::print(&format!("{cases} diagnoses in {directory}\n"));
         }
         Err(failure(format!("{} recordings were not diagnosed:\n{}", failed.len(), failed.join("\n"))))
     }
@@ -210,7 +212,7 @@ impl Score {
             open_answers(&self.directory)?;
         }
         if self.json {
-            return streams::print_json(&scored);
+            return standard_output::print_json(&scored);
         }
         let mut document = Document::default();
         document.facts("", scored.rows());
@@ -220,7 +222,7 @@ impl Score {
         rows.for_each(|row| table.row(row));
         document.table(table);
         document.text("Brackets are exact 95 % intervals of the share.");
-        streams::print(&scored.case_lines())?;
-        streams::show(&document)
+        standard_output::print(&scored.case_lines())?;
+        standard_output::show(&document)
     }
 }

@@ -5,7 +5,7 @@ use crate::commands::identify::MethodArgument;
 use crate::environment::registry;
 use crate::interrupt;
 use crate::output::failure::Failure;
-use crate::output::{output_options, streams};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_core::Method;
 use mapper_report::{correction, with_messages};
@@ -53,7 +53,7 @@ impl Correct {
         let method = self.method.map(Method::from);
         interrupt::end_at_once()?;
         let gap = session.gap(&recorded, (&campaign, &map), effects, self.diagnosis.as_deref())?;
-        streams::warn_of_unused(&gap);
+        standard_output::warn_of_unused(&gap);
         let corrected = session.correct_gap(gap, &recorded, &map, method, self.out.as_deref())?;
         progress.clear();
         if self.json {
@@ -66,8 +66,8 @@ impl Correct {
                     "identified": corrected.identified.json(Some(&recorded.path), &warnings),
                 }))
             };
-            return streams::print_json(&with_messages(values)?);
+            return standard_output::print_json(&with_messages(values)?);
         }
-        streams::show(&correction(&corrected.map, &corrected.gap.diagnosed.diagnosis))
+        standard_output::show(&correction(&corrected.map, &corrected.gap.diagnosed.diagnosis))
     }
 }

@@ -4,8 +4,8 @@ use crate::command_line::channel_map;
 use crate::environment::registry;
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
-use crate::output::streams::FileOutput;
-use crate::output::{output_options, streams};
+use crate::output::standard_output::FileOutput;
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_diagnose::gap::ClosureTerm;
 use mapper_report::{Describe, Document, headline, with_messages};
@@ -101,9 +101,9 @@ impl Diagnose {
         }
         if let [(_, gap)] = &gaps[..] {
             return if self.output.json {
-                streams::print_json(&with_messages(|| gap.json())?)
+                standard_output::print_json(&with_messages(|| gap.json())?)
             } else {
-                streams::show(&document(gap))
+                standard_output::show(&document(gap))
             };
         }
         if self.output.json {
@@ -116,12 +116,12 @@ impl Diagnose {
                 })
                 .collect();
             let each = json!({ "format_version": DIAGNOSIS_FORMAT, "recordings": each? });
-            return streams::print_json(&each);
+            return standard_output::print_json(&each);
         }
         let mut document = Document::default();
         let head = |(path, gap): &(String, Gap)| format!("{path}: {}", headline(&gap.diagnosed.diagnosis));
         document.list(gaps.iter().map(head));
-        streams::show(&document)
+        standard_output::show(&document)
     }
 
     /// Writes the file of the diagnosis. That of a run directory belongs to the program, which replaces it.
@@ -131,7 +131,7 @@ impl Diagnose {
             return Ok(self.output.write(file, text.as_bytes())?);
         }
         if let Err(error) = write_file(file, text.as_bytes(), Existing::Replaced) {
-            streams::say(&format!("the diagnosis is not kept: {error}\n"));
+            standard_output::say(&format!("the diagnosis is not kept: {error}\n"));
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::output::streams;
+use crate::output::standard_output;
 use clap::Args;
 use mapper_report::{Document, Table};
 use serde_json::json;
@@ -24,7 +24,7 @@ impl Effects {
         let effects = registry().effects_with(&self.effects)?;
         if self.json {
             let list: Vec<_> = effects.iter().map(|effect| effect.info().clone()).collect();
-            return streams::print_json(&json!({ "effects": list }));
+            return standard_output::print_json(&json!({ "effects": list }));
         }
         let heads = ["effect", "part", "unit", "neutral", "range"];
         let mut table = Table::new(heads).with_texts([1, 2]);
@@ -46,6 +46,6 @@ impl Effects {
         let mut document = Document::default();
         document.table(table);
         document.append(legend);
-        streams::show(&document)
+        standard_output::show(&document)
     }
 }

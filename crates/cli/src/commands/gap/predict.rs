@@ -3,7 +3,7 @@
 use crate::command_line::channel_map;
 use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::output::streams;
+use crate::output::standard_output;
 use clap::Args;
 use mapper_report::{Document, forecast_check};
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, SealedForecast, Session, found_in};
@@ -52,7 +52,7 @@ impl Predict {
             let forecast = SealedForecast::new(campaign.name.clone(), found, steps);
             let (seal, steps) = (forecast.write(&self.forecast)?, forecast.steps.len());
             if self.json {
-                return streams::print_json(
+                return standard_output::print_json(
                     &json!({ "forecast": self.forecast, "steps": steps, "sha256": seal, "doubt": doubt }),
                 );
             }
@@ -60,7 +60,7 @@ impl Predict {
             document.text(format!("forecast of {steps} steps in {}", self.forecast.display()));
             document.text(format!("SHA-256: {seal}"));
             document.text(doubt.map(|doubt| format!("warning: {doubt}")).unwrap_or_default());
-            return streams::show(&document);
+            return standard_output::show(&document);
         }
         // clap requires a recording if no diagnosis is given.
         let Some(recording) = &self.recording else { return Ok(()) };
@@ -68,10 +68,10 @@ impl Predict {
         let recorded = Recorded::read(&registry, recording, &map, Some(&campaign))?;
         let check = session.check_forecast(&recorded, &campaign, &map, effects, &forecast.found)?;
         if self.json {
-            return streams::print_json(&json!({
+            return standard_output::print_json(&json!({
                 "format_version": DIAGNOSIS_FORMAT, "sha256": seal, "check": check,
             }));
         }
-        streams::show(&forecast_check(&check, &seal))
+        standard_output::show(&forecast_check(&check, &seal))
     }
 }

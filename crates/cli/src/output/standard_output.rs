@@ -1,16 +1,18 @@
-//! Standard output: results of commands as text or one JSON object, and files; standard error: messages, wrapped to the terminal.
+//! Standard output: the results of commands, as text or as one JSON object, and the files that they write.
 
 use crate::output::failure::{Code, Failure};
 use crate::output::output_options::paint;
+pub use crate::output::standard_error::say;
+use crate::output::standard_error::wrap_for_terminal;
 use clap::Args;
 use mapper_core::{terminal_json, terminal_text};
-use mapper_report::{Describe, Document, with_messages, wrapped};
+use mapper_report::{Describe, Document, with_messages};
 use mapper_session::{Existing, Gap, MapOut, MapWork, SessionError, write_file};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use terminal_size::{Height, Width, terminal_size_of};
+use terminal_size::terminal_size_of;
 
 /// Whether the one JSON object has been printed.
 static PRINTED: AtomicBool = AtomicBool::new(false);
@@ -110,30 +112,4 @@ pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
 /// Whether a JSON object was printed; only one is allowed.
 pub fn has_printed() -> bool {
     PRINTED.load(Ordering::Relaxed)
-}
-
-/// Writes text to standard error. A failure to write is ignored.
-pub fn say(text: &str) {
-    say_rendered(&terminal_text(text));
-}
-
-/// Writes coloured text whose file names and keys are already free of control characters.
-pub fn say_rendered(text: &str) {
-    let _ = write!(std::io::stderr().lock(), "{text}");
-}
-
-/// Wraps long lines to the width of the terminal. Without a terminal the text is unchanged, so that other programs get whole lines.
-pub fn wrap_for_terminal(text: &str, size: Option<(Width, Height)>) -> String {
-    let Some((Width(columns), _)) = size else { return text.to_owned() };
-    let columns = usize::from(columns);
-    let lines = text.split_inclusive('\n').map(|line| {
-        // Coloured lines and rows of tables have their own layout.
-        let is_prose = !line.contains('\x1b') && !line.trim().contains("   ");
-        if is_prose && line.trim_end().chars().count() > columns {
-            wrapped(line, columns, line.len() - line.trim_start().len() + 2)
-        } else {
-            line.to_owned()
-        }
-    });
-    lines.collect()
 }

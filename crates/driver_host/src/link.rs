@@ -145,8 +145,7 @@ impl Link {
         line.map_or_else(String::new, |line| format!("; its last error output: {line}"))
     }
 
-    /// Closes the driver's input, which ends the driver or, for a socket, its session. A driver that holds a rig is left to execute its safe
-    /// trajectory. Any other driver is killed or disconnected after `within`.
+    /// Closes the driver's input or session. A driver that holds a rig is left to its safe trajectory; any other is ended after `within`.
     pub(crate) fn close(&mut self, holds_a_rig: bool, within: Duration) {
         self.sender = None;
         let end = Instant::now() + within;

@@ -195,8 +195,7 @@ impl Engine<'_> {
         self.jobs.unwrap_or_else(cores).clamp(1, pieces.max(1))
     }
 
-    /// Applies `work` to every piece. Results are in the order of the pieces for any number of jobs. Concurrent pieces share the cores. After
-    /// an error or a stop no further piece starts; pieces that did not start because of a stop are `None`.
+    /// Applies `work` to every piece, in their order. After an error or a stop no further piece starts; after a stop those are `None`.
     pub fn each<T: Sync, R: Send, E: Send>(
         &self,
         pieces: &[T],

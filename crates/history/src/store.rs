@@ -395,7 +395,6 @@ pub enum HistoryError {
     Directory(PathBuf, #[source] std::io::Error),
     #[error("there is no history at {}; run a nightly campaign to make one, or name another file", .0.display())]
     Missing(PathBuf),
-    /// The file is a database of something else, or of a newer program.
     #[error("{} is not a history that this program can read: {reason}; name another file", .path.display())]
     Foreign { path: PathBuf, reason: String },
     #[error("the history {} cannot be written; check the permissions, or name another file", .0.display())]

@@ -176,8 +176,7 @@ fn leaves_first(addresses: &[Option<IpAddr>]) -> Option<usize> {
 }
 
 impl Connections {
-    /// Adds a connection. If there are too many short connections, the oldest one of the address with the most of them is closed. `None` if the connection
-    /// is already closed.
+    /// Adds a connection; with too many short ones, the oldest of the busiest address is closed. `None` if it is closed already.
     pub(crate) fn admit(self: &Arc<Connections>, stream: &TcpStream) -> Option<Connection> {
         let (address, own_stream) = (stream.peer_addr().ok()?.ip(), stream.try_clone().ok()?);
         let mut open = self.lock();

@@ -63,10 +63,8 @@ pub enum SessionError {
     Nightly(#[from] NightlyError),
     #[error("{}: the points of a script may differ between nights; replace `sequence` by a grid", .0.display())]
     NightlySequence(PathBuf),
-    /// Two runs of a night have the same campaign, machine, method and seed.
     #[error("{0} appears twice in the nightly campaign; give each campaign its own name")]
     DuplicateNightlyRun(String),
-    /// Rows of a study do not match the runs of this night.
     #[error("the study does not belong to this nightly campaign: {0}; make a new study")]
     NightlyMismatch(String),
     #[error(transparent)]
@@ -82,7 +80,6 @@ pub enum SessionError {
     DifferentCampaigns { first: PathBuf, other: PathBuf, differs: &'static str },
     #[error("recordings that are identified together need the same channel map; identify each separately")]
     DifferentChannelMaps,
-    /// With the reasons.
     #[error("the points make no map: {0}")]
     NoMap(String),
     #[error(
@@ -99,7 +96,6 @@ pub enum SessionError {
     NotAPlan(PathBuf, #[source] serde_json::Error),
     #[error("{} is stale: {} changed since it was made; make a new plan", .path.display(), .changed.join(" and "))]
     StalePlan { path: PathBuf, changed: Vec<&'static str> },
-    /// The name of the backend or its settings are wrong.
     #[error(transparent)]
     Backend(BackendError),
     /// `at`: key path of the instrument in the campaign; `setting`: path below it if one of the backend's own settings is wrong.
@@ -107,7 +103,6 @@ pub enum SessionError {
     Reader { at: String, setting: String, source: mapper_core::BackendCause },
     #[error("{} is not a valid plan: {why}; make a new plan", .path.display())]
     InvalidPlan { path: PathBuf, why: String },
-    /// With what is known about the recording.
     #[error("no point was identified: no step of the recording is long enough. {0}")]
     NoPoints(String),
     #[error("{} and {} contain the same readings, whose noise would count as independent evidence; give each recording once",
@@ -117,7 +112,6 @@ pub enum SessionError {
     SeveralRecordings(PathBuf),
     #[error("{} cannot be resumed: {why}", .run.display())]
     NotResumable { run: PathBuf, why: String },
-    /// The journal and the recordings of a run disagree.
     #[error("{}: the journal lists steps that no recording contains: {lost}. Restore the file, or run these steps again", .run.display())]
     LostSteps { run: PathBuf, lost: String },
     #[error("the rig `{rig}` is in use by {owner}; wait until that run ends, or stop it")]
@@ -131,13 +125,11 @@ pub enum SessionError {
         "the rig `{rig}` has been locked out{}: {reason}. Inspect the rig; then acknowledge that it is safe", since_text(.run)
     )]
     RigLockedOut { rig: String, reason: String, run: PathBuf },
-    /// A file that may mean this rig or another one.
     #[error("the rig `{rig}` has been locked out: {reason}")]
     RigFileDoubtful { rig: String, reason: String },
     /// `awaiting`: rigs that wait for acknowledgement.
     #[error("the rig `{rig}` needs no acknowledgement, or there is no rig of that name; {}", awaiting_text(.awaiting))]
     NothingToAcknowledge { rig: String, awaiting: Vec<String> },
-    /// The rig could not be armed, so the run did not start.
     #[error(transparent)]
     NotArmed(RunError),
     #[error("the run was not started: {0}")]

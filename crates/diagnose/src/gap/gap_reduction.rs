@@ -118,9 +118,8 @@ impl StepMisfit {
     }
 }
 
-/// Every step with a gap counts as one trial, whatever its size. The interval is Clopper and Pearson's for the mean share removed. The
-/// share of the whole gap is weighted by size, so one step may dominate it. The interval is then widened to include that share, and the
-/// step is named.
+/// Every step with a gap is one trial, whatever its size. The interval is Clopper and Pearson's for the mean share removed, widened to
+/// include the share of the whole gap, which is weighted by size: one step, which is named, may dominate it.
 pub(crate) fn gap_reduction(steps: &[StepMisfit]) -> GapReduction {
     let positive = |g: f64| g.max(0.0);
     let total: f64 = steps.iter().map(|step| positive(step.before)).sum();
@@ -327,9 +326,8 @@ fn rise_residual_ratio(study: &Study, step: usize, predicted: &[f64]) -> Option<
     (rise_k > 1.0).then(|| ((study.measured[row] - predicted[row]) / rise_k).abs())
 }
 
-/// Efficiency and heat transfer at the end of each step: with the cause and its tolerances, with these tolerances alone, and for the
-/// nominal model. All use the same speed, pressures and metal temperatures, so a shifted operating point does not appear as an efficiency
-/// change.
+/// Efficiency and heat transfer at the end of each step: with cause and tolerances, with the tolerances alone, nominal. All at the same
+/// speed, pressures and metal temperatures, so a shifted operating point is no change of efficiency.
 fn points(study: &Study, after: &Hypothesis, predicted: &[f64]) -> Vec<PointGap> {
     let tolerances = Hypothesis { nuisances: after.nuisances.clone(), effects: Vec::new() };
     let nothing = study.nothing();

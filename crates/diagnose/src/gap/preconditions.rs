@@ -162,7 +162,6 @@ pub enum Problem {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum GapError {
-    /// The recording does not fit the campaign, or required data are missing.
     #[error(transparent)]
     Recording(#[from] Problem),
     #[error(

@@ -19,8 +19,7 @@ pub(crate) fn variation(study: &Study, output: usize) -> Option<(f64, f64)> {
     Some((middle, mean(readings().map(|reading| (reading - middle).powi(2)))?.sqrt()))
 }
 
-/// A repeating part of an output as a whole: its rows, and the reading's share in them. The first is the level, the others are the changes after
-/// each jump that decay with a time constant of [`RESPONSES_S`].
+/// A repeating part of an output: its rows, and the reading's share: the level, or the decay after each jump by one of [`RESPONSES_S`].
 pub(crate) fn repeating_part(study: &Study, output: usize, part: usize) -> Vec<(usize, f64)> {
     let Some((middle, _)) = variation(study, output) else { return Vec::new() };
     let mut before = None;

@@ -240,8 +240,7 @@ pub struct GapCorrection {
     pub gap: Gap,
     /// Before and after, point by point.
     pub map: CorrectedMap,
-    /// Identification of the corrected readings, the uncertainty of the correction in its intervals; that of the readings as recorded, what
-    /// the open causes would change in its intervals, if nothing was corrected.
+    /// Identification of the corrected readings with the uncertainty of the correction; if nothing was corrected, widened by the open causes.
     pub identified: Identified,
 }
 

@@ -359,9 +359,8 @@ impl FirstMap {
     }
 }
 
-/// The table of a nominal map: monotone cubics through the file's points, on its lines and on others between them, or the points themselves if
-/// there are too few. Linear interpolation between few points has kinks, which identification would mistake for heat transfer; a fitted surface
-/// would not pass through the points.
+/// The table of a nominal map: monotone cubics through the file's points, on its lines and others between, or the points themselves if too
+/// few. Kinks of linear interpolation would be taken for heat transfer, and a fitted surface misses the points.
 fn resample_table(
     registry: &Registry,
     path: &Path,

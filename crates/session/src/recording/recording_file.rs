@@ -111,8 +111,7 @@ impl Recorded {
     }
 }
 
-/// The recordings of a run, each with its valid steps; of the last part, every complete step is valid. Parts without a step or soak are omitted.
-/// So are parts with exactly the data of a later part, which only a simulated rig produces.
+/// The recordings of a run, each with its valid steps (of the last all complete ones); no empty parts, no repeated data of a simulator.
 pub(crate) fn merge_parts<'a>(
     parts: impl ExactSizeIterator<Item = ((bool, Option<&'a BTreeSet<usize>>), Recorded)>,
 ) -> Vec<Recorded> {

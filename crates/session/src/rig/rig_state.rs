@@ -25,8 +25,7 @@ const SYSTEM_DIRECTORY: &str = "/var/lib/mapper";
 /// Directory that every user may create. It survives restarts.
 const FALLBACK_DIRECTORY: &str = "/var/tmp/mapper";
 
-/// The directory for locks and lockouts. All users of a computer share it, because several of them may drive one rig. It is `/var/lib/mapper` if
-/// that exists, otherwise `/var/tmp/mapper`, or the directory for temporary files on systems without these.
+/// The directory for locks and lockouts, shared by all users: `/var/lib/mapper` if it exists, else `/var/tmp/mapper`, or a temporary one.
 pub fn shared_state_directory() -> PathBuf {
     let shared = Path::new(FALLBACK_DIRECTORY);
     match Path::new(SYSTEM_DIRECTORY) {

@@ -145,8 +145,7 @@ fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Opt
     })
 }
 
-/// Weight of each case, 1 on average. The threshold needs many cases without a cause; together they count only as much as the
-/// prior probability of no cause, so that the fitted and judged probabilities are those that the user reads.
+/// Weight of each case, 1 on average: cases without a cause count together as much as their prior, so that probabilities are the user's.
 pub(crate) fn weights(calibration: &Calibration, observed: &[DiagnosisSummary]) -> Vec<f64> {
     let all = observed.len() as f64;
     let nothing = observed.iter().filter(|o| o.kind == CaseKind::None).count() as f64;
@@ -168,8 +167,7 @@ pub fn fitted(observed: &[DiagnosisSummary], made_by: String) -> Result<Calibrat
     Ok(fit(&shipped()?, observed, made_by))
 }
 
-/// Fits the calibration to all observed cases, weak signatures included: a hardly visible outside cause is mistaken for an effect of the
-/// catalogue, and the probabilities must reflect how often that happens.
+/// Fits the calibration to all cases, weak signatures included: hardly visible outside causes are mistaken for effects of the catalogue.
 pub fn fit(before: &Calibration, observed: &[DiagnosisSummary], made_by: String) -> Calibration {
     let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(DiagnosisSummary::margin);
     let threshold = at_least(quantile(margins, QUIET_SHARE), MIN_THRESHOLD, before.threshold);
@@ -241,8 +239,7 @@ pub fn undetermined(calibration: &Calibration) -> Vec<String> {
 /// 5.4 sigmas on (`evidence_needed` in `mapper_diagnose`, and 1.64 for the noise).
 const DETECTABLE_SIGMAS: f64 = 6.0;
 
-/// Share of the cases with detectable causes of the catalogue in which these are not among the candidates: mean of the posterior under
-/// Jeffreys' prior, with its origin. `None` without such cases.
+/// Share of cases whose detectable catalogue causes are no candidates: posterior mean (Jeffreys' prior), origin. `None` without cases.
 fn unlisted(observed: &[DiagnosisSummary]) -> Option<(f64, Origin)> {
     let is_detectable = |o: &&DiagnosisSummary| {
         !matches!(o.kind, CaseKind::None | CaseKind::Outside)

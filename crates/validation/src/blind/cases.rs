@@ -111,8 +111,7 @@ impl Draw {
         }
     }
 
-    /// Draws the cases. Kinds are in random order. Causes are dealt like cards: each effect with each sign occurs once before any repeats.
-    /// Signature lengths are uniform in their logarithm. Equal settings give equal cases.
+    /// Draws cases, kinds in random order; causes are dealt like cards, signature lengths are log-uniform. Equal settings give equal cases.
     pub fn cases(&self, catalogue: &[Arc<dyn Effect>], meter: &dyn SignatureMeter) -> Vec<Case> {
         let mut random = Pcg64::seed_from_u64(self.seed);
         // Effects without influence on this machine are not causes, e.g. convection before the wheel without area there.

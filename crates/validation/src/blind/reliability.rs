@@ -82,8 +82,7 @@ pub struct Reliability {
     pub calibration: String,
     /// The classes with cases, in ascending order of probability.
     pub bins: Vec<Bin>,
-    /// Expected calibration error: the mean distance over all cases between the share of correct answers in a class and its mean
-    /// probability, fraction (Naeini, Cooper and Hauskrecht 2015); `None` without cases.
+    /// Expected calibration error, fraction (Naeini, Cooper and Hauskrecht 2015): mean distance of right share and probability, or `None`.
     pub expected_calibration_error: Option<f64>,
     /// The error expected by chance if all probabilities are correct.
     pub expected_by_chance: Option<f64>,

@@ -369,7 +369,6 @@ pub enum ReproduceError {
     Simulation(#[from] SimulationError),
     #[error(transparent)]
     Identify(#[from] IdentifyError),
-    /// A step has no point.
     #[error(transparent)]
     Step(#[from] StepError),
     #[error("a simulated run has no step or no sample in the window")]

@@ -15,7 +15,6 @@ use std::sync::{Mutex, PoisonError};
 pub enum StudyError {
     #[error("{}: its rig `{backend}` is not simulated; studies run only on backends of this program", .campaign.display())]
     Rig { campaign: PathBuf, backend: String },
-    /// A campaign that was checked when the study was made has mistakes now.
     #[error("the campaign of the item has mistakes: {0}")]
     Campaign(String),
     #[error("the item has no file {0}")]

@@ -286,9 +286,8 @@ impl Calibration {
 const MAX: f64 = 500.0;
 
 impl Calibration {
-    /// Transforms the features of an unmodelled cause for its logistic model. Smooth misfit enters as half its square, the negative
-    /// log-probability under noise. Scatter enters by order of magnitude: it grows with any cause, which linearised models follow only to a few per
-    /// cent.
+    /// Transforms the features of an unmodelled cause for its logistic model: smooth misfit as half its square (negative log-probability of
+    /// noise), scatter by order of magnitude, because linearised models follow any cause only to a few per cent.
     pub fn logistic_features([smooth_sigma, scatter_sigma]: [f64; 2]) -> [f64; 2] {
         let unlikely = 0.5 * smooth_sigma.max(0.0).powi(2);
         [unlikely.min(MAX), scatter_sigma.max(0.0).asinh()]

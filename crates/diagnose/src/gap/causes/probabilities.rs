@@ -34,8 +34,7 @@ const LATE_RATIO: f64 = 0.005;
 /// Minimum ratio of the numbers of sets of one effect more. Bound: avoids the logarithm of zero if a set has all effects.
 const MIN_SETS_RATIO: f64 = 0.1;
 
-/// Logarithm of the prior of a cause. Pairs are rarer than singles, and there are many pairs. Causes that begin during the recording are
-/// rarer still, and may begin with any step.
+/// Logarithm of a cause's prior: pairs are rarer and more numerous; causes that begin during the recording are rarer, with any step.
 pub(crate) fn prior(calibration: &Calibration, study: &Study, hypothesis: &Hypothesis) -> f64 {
     let of_number = prior_of_number(calibration, study.catalogue, hypothesis.effects.len());
     let late =

@@ -36,6 +36,8 @@ fn within(changes: Option<(f64, f64)>, limits: (f64, f64)) -> Verdict {
     Verdict::of(low >= from && high <= to, low <= to && high >= from)
 }
 
+type Value = fn(&Truth) -> f64;
+
 /// Seconds until a quantity has made [`ONE_TIME_CONSTANT`] of its change.
 fn time_constant_s(run: &Run, value: fn(&Truth) -> f64) -> f64 {
     let (first, last) = (run.truth.first().map_or(f64::NAN, value), run.truth.last().map_or(f64::NAN, value));
@@ -46,7 +48,7 @@ fn time_constant_s(run: &Run, value: fn(&Truth) -> f64) -> f64 {
 /// Seconds after which flow, pressure ratio and speed stay within the paper's variations over 100 s; `None` if they do not within the run.
 fn stable_s(run: &Run) -> Option<f64> {
     let bands = SettleBands::PAPER;
-    let signals: [(fn(&Truth) -> f64, f64); 3] = [
+    let signals: [(Value, f64); 3] = [
         (|t| t.flow_kg_s, bands.flow_ratio),
         (|t| t.pressure_ratio, bands.pressure_ratio_ratio),
         (|t| t.speed_rpm, bands.speed_ratio),
@@ -73,6 +75,7 @@ fn properties() -> Vec<Statement> {
     let ln_prandtl =
         |t_k: f64| heat_capacity_j_kgk(t_k).ln() + viscosity_pa_s(t_k).ln() - ln_conductivity_ratio(t_k);
     let prandtl = change_percent(ln_prandtl);
+    let [re, pr] = [within(reynolds, (4.0, 6.0)), within(prandtl, (0.0, 0.0))];
     // The skin keeps its temperature.
     let h = |exponent: f64| {
         change_percent(|t_k| {
@@ -100,11 +103,7 @@ fn properties() -> Vec<Statement> {
         Statement::new(
             "Re changes by 4 to 6 % and Pr by less than 0.3 %.",
             format!("Re {} % at constant flow, Pr {} %.", range(reynolds, 1), range(prandtl, 1)),
-            match (within(reynolds, (4.0, 6.0)), within(prandtl, (0.0, 0.0))) {
-                (Verdict::Holds, Verdict::Holds) => Verdict::Holds,
-                (Verdict::Differs, _) => Verdict::Differs,
-                _ => Verdict::Partly,
-            },
+            Verdict::of([re, pr] == [Verdict::Holds; 2], re != Verdict::Differs),
         ),
         Statement::new(
             "Therefore h changes by less than 1 % and may be taken as constant.",

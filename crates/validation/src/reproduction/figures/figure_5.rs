@@ -81,10 +81,7 @@ fn heat_of_the_turbine() -> Result<Statement, ReproduceError> {
             range(nominal, 0).replace('+', ""),
             range(paper, 0).replace('+', "")
         ),
-        match paper {
-            Some((low, high)) if low > 60.0 && high < 80.0 => Verdict::Holds,
-            _ => Verdict::Partly,
-        },
+        Verdict::of(paper.is_some_and(|(low, high)| low > 60.0 && high < 80.0), true),
     ))
 }
 

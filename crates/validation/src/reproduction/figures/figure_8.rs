@@ -154,11 +154,8 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
                 range(wrong_three, 1),
                 range(extremes(wrong_errors()), 1)
             ),
-            match wrong_three {
-                // The identified efficiency is too low: heat before compression makes the same work look larger.
-                Some((low, high)) if low > -16.0 && high < -7.0 => Verdict::Holds,
-                _ => Verdict::Partly,
-            },
+            // The identified efficiency is too low: heat before compression makes the same work look larger.
+            Verdict::of(wrong_three.is_some_and(|(low, high)| low > -16.0 && high < -7.0), true),
         ),
         Statement::new(
             "Up to 10 points at 150 krpm.",

@@ -117,7 +117,7 @@ mod with {
 
 #[cfg(not(feature = "tls"))]
 mod without {
-    use SUPER1::{DeadlineStream, TlsError, TlsFiles};
+    use super::{DeadlineStream, TlsError, TlsFiles};
 
     /// Placeholder for builds without TLS.
     #[derive(Clone)]

@@ -88,8 +88,7 @@ pub struct Contours {
 }
 
 impl Contours {
-    /// Contours at `levels` (unit of the field, any order; values that are not finite are skipped), each labelled
-    /// by `text`.
+    /// Contours at `levels` (unit of the field, any order; values that are not finite are skipped), labelled by `text`.
     pub fn new(grid: StructuredGrid, levels: &[f64], text: impl Fn(f64) -> String) -> Self {
         let mut values: Vec<f64> = levels.iter().copied().filter(|v| v.is_finite()).collect();
         values.sort_by(f64::total_cmp);
@@ -141,8 +140,7 @@ fn cell_segments(
     segments: &mut Vec<[usize; 2]>,
 ) {
     let above = cell.map(|node| node[2] >= level);
-    // Edges in order around the cell, each with its corners in the order of the grid, so that two cells have the same
-    // point on a common edge.
+    // Edges around the cell, corners in the order of the grid, so that two cells have the same point on a common edge.
     let edges = [
         (edge_id(grid, row, column, 0), 0, 1),
         (edge_id(grid, row, column + 1, 1), 1, 2),
@@ -247,8 +245,7 @@ pub(crate) fn band(grid: &StructuredGrid, low: f64, high: f64) -> Vec<Vec<(f64, 
     polygons
 }
 
-/// The cell itself, or four triangles around its middle if it is a saddle: otherwise the bands of a
-/// saddle would overlap. The middle has the mean of the corners, as for contour lines.
+/// The cell itself, or four triangles around the mean of its corners if it is a saddle, whose bands would overlap.
 fn pieces(cell: &[Node; 4]) -> Vec<Vec<Node>> {
     let [a, b, c, d] = cell.map(|node| node[2]);
     let saddle = a.min(c) > b.max(d) || b.min(d) > a.max(c);
@@ -283,7 +280,6 @@ fn cut(polygon: &[Node], level: f64, keep: impl Fn(f64) -> bool) -> Vec<Node> {
     out
 }
 
-/// Position and angle of a text on a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LabelPlace {
     /// Middle of the text, px.
@@ -294,8 +290,7 @@ pub(crate) struct LabelPlace {
     pub gap: (f64, f64),
 }
 
-/// Finds the straightest part of a line for a text `width_px` wide, away from `obstacles`; `None` if the line is
-/// too short. Placed texts are obstacles too.
+/// Finds the straightest part of a line for a text `width_px` wide, away from `obstacles` and placed texts; `None` if it is too short.
 pub(crate) fn place(line: &[(f64, f64)], width_px: f64, obstacles: &[(f64, f64)]) -> Option<LabelPlace> {
     let lengths = cumulative_lengths(line);
     let total = *lengths.last()?;
@@ -336,7 +331,6 @@ pub(crate) fn place(line: &[(f64, f64)], width_px: f64, obstacles: &[(f64, f64)]
     best.map(|b| b.1)
 }
 
-/// The line without the part `gap`.
 pub(crate) fn without_gap(line: &[(f64, f64)], gap: (f64, f64)) -> [Vec<(f64, f64)>; 2] {
     let lengths = cumulative_lengths(line);
     let mut before: Vec<(f64, f64)> =
@@ -347,7 +341,6 @@ pub(crate) fn without_gap(line: &[(f64, f64)], gap: (f64, f64)) -> [Vec<(f64, f6
     [before, after]
 }
 
-/// Length of the line up to each of its points.
 fn cumulative_lengths(line: &[(f64, f64)]) -> Vec<f64> {
     let mut sum = 0.0;
     let mut out = Vec::with_capacity(line.len());
@@ -406,7 +399,6 @@ impl Rect {
     }
 }
 
-/// Whether a segment touches the rectangle.
 pub(crate) fn touches(a: (f64, f64), b: (f64, f64), rect: &Rect) -> bool {
     segment(a, b, rect).is_some()
 }

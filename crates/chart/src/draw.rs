@@ -7,7 +7,7 @@ use crate::layout::{
     AXIS_TITLE_PX, MARGIN_PX, PANEL_TITLE_PX, PlacedPanel, SUBTITLE_PX, Surroundings, TICK_PX, TITLE_PX,
     draw_legend, draw_marker, layout,
 };
-use crate::map_drawing::{Drawing, Stroke, TextAnchor, TextStyle};
+use crate::map_drawing::{Drawing, Shape, Stroke, TextAnchor, TextStyle};
 use crate::palette::{BLUE, Colour, GREY, INK, LIGHT_GREY};
 use crate::text::{cut, width_px};
 use crate::{Contours, Figure, Panel};
@@ -64,7 +64,7 @@ pub(crate) fn draw_figure(figure: &Figure) -> Drawing {
 
 fn draw_panel(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
     let frame = &placed.frame;
-    drawing.open_group("panel");
+    drawing.shapes.push(Shape::OpenGroup("panel".to_owned()));
     draw_axes(drawing, placed);
     let mut obstacles = find_obstacles(frame, &placed.panel.items);
     let mut late = Vec::new();
@@ -87,7 +87,7 @@ fn draw_panel(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
         drawing.text(text.at, &text.text, &text.style);
     }
     draw_legend(drawing, &placed.entries, &placed.legend_places, placed.legend_origin);
-    drawing.close_group();
+    drawing.shapes.push(Shape::CloseGroup);
 }
 
 /// Finds the positions that labels of contour lines avoid: markers, arrow heads and texts at the ends of lines.
@@ -175,7 +175,6 @@ fn draw_line(drawing: &mut Drawing, frame: &Frame, line: &Line, late: &mut Vec<L
     }
 }
 
-/// Middle of the text at a line's end.
 fn end_label_at(frame: &Frame, line: &Line) -> Option<(f64, f64)> {
     let (text, end) = line.end_label.as_ref()?;
     let points: Vec<_> = line.points.iter().map(|p| frame.px(*p)).collect();
@@ -313,7 +312,6 @@ fn draw_point_labels(drawing: &mut Drawing, placed: &PlacedPanel<'_>, late: &mut
     }
 }
 
-/// The box of a text that is not turned.
 fn text_box(at: (f64, f64), text: &str, style: &TextStyle) -> Rect {
     let width = width_px(text, style.size_px);
     let left = match style.anchor {

@@ -31,8 +31,7 @@ pub struct InterpolatedLine {
     pub nodes: Vec<[f64; 3]>,
 }
 
-/// The measured lines, with [`SUBDIVISIONS`] - 1 lines between two of them, as described in the source of this module. `None` if fewer than
-/// two lines can be used.
+/// The measured lines, with [`SUBDIVISIONS`] - 1 lines between two of them, by the source of this module. `None` for fewer than two.
 pub fn interpolated_lines(map: &CompressorMap) -> Option<Vec<InterpolatedLine>> {
     let spans = spans(&map.lines)?;
     let mut rows: Vec<InterpolatedLine> = map.lines.iter().filter_map(|line| row(line, spans)).collect();
@@ -76,8 +75,7 @@ fn spans(lines: &[SpeedLine]) -> Option<(f64, f64)> {
     Some((span(|p| p.flow_corrected_kg_s)?, span(|p| p.pressure_ratio)?))
 }
 
-/// Sorts the points of a line from surge to choke by flow minus pressure ratio, so that noise does not change the order of
-/// points on the steep part at choke or on the flat part at surge.
+/// Sorts a line from surge to choke by flow minus pressure ratio: noise changes no order on the steep part or the flat one.
 fn surge_to_choke(line: &SpeedLine, (flow_span, ratio_span): (f64, f64)) -> Vec<&MapPoint> {
     let mut points: Vec<&MapPoint> = line.points.iter().collect();
     let key = |p: &MapPoint| p.flow_corrected_kg_s / flow_span - p.pressure_ratio / ratio_span;

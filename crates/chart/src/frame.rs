@@ -77,7 +77,6 @@ pub(crate) fn labels(values: &[f64]) -> Vec<String> {
     values.iter().map(|v| text(*v).replace('-', "\u{2212}")).collect()
 }
 
-/// An axis with its final range and ticks.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Scale {
     pub low: f64,
@@ -98,7 +97,6 @@ impl Scale {
     }
 }
 
-/// A panel's drawing area with its scales.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Frame {
     pub rect: Rect,
@@ -115,7 +113,6 @@ impl Frame {
     }
 }
 
-/// Smallest and largest finite value so far.
 #[derive(Debug, Clone, Copy)]
 struct Extent {
     low: f64,
@@ -137,7 +134,6 @@ impl Extent {
     }
 }
 
-/// Determines the scales of a panel of `width_px` by `height_px`.
 pub(crate) fn fit_scales(panel: &Panel, width_px: f64, height_px: f64) -> (Scale, Scale) {
     let (mut x, mut y) = (Extent::NONE, Extent::NONE);
     for item in &panel.items {
@@ -173,8 +169,7 @@ pub(crate) fn fit_scales(panel: &Panel, width_px: f64, height_px: f64) -> (Scale
     (fit_scale(&panel.x, x, (width_px / 75.0) as usize), fit_scale(&panel.y, y, (height_px / 48.0) as usize))
 }
 
-/// Extends the range for error bars, up to half the span of the points on each side, so that one very uncertain point does not compress all
-/// others.
+/// Extends the range for error bars, at most by half the span on each side, so that one uncertain point does not compress the others.
 fn widen(
     extent: &mut Extent,
     points: Extent,

@@ -290,8 +290,7 @@ impl Annotation {
     }
 }
 
-/// Short texts next to points, e.g. the numbers of steps. No text covers a marker or another text, and each covers as few lines as
-/// possible; distant texts have a leader line.
+/// Short texts next to points, e.g. numbers of steps, clear of markers and other texts; distant ones have a leader line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointLabels {
     /// Texts with their points, the most important first; labels without a free position are omitted.

@@ -22,7 +22,6 @@ const RIGHT_PX: f64 = 10.0;
 /// Gap between panels, and between entries of a legend, px.
 const GAP_PX: f64 = 18.0;
 
-/// A panel with the positions of its parts.
 pub(crate) struct PlacedPanel<'a> {
     pub panel: &'a Panel,
     pub frame: Frame,
@@ -31,7 +30,6 @@ pub(crate) struct PlacedPanel<'a> {
     pub legend_origin: (f64, f64),
 }
 
-/// The whole figure with the positions of its parts.
 pub(crate) struct Sheet<'a> {
     pub width: f64,
     pub height: f64,
@@ -105,7 +103,6 @@ const ROW_PX: f64 = 20.0;
 const SWATCH_PX: f64 = 28.0;
 const LONGEST_TEXT_PX: f64 = 420.0;
 
-/// A symbol in the legend.
 #[derive(Debug, Clone, Copy)]
 enum Swatch<'a> {
     Line(Stroke),
@@ -113,7 +110,6 @@ enum Swatch<'a> {
     Area(Colour, f64),
 }
 
-/// A text with the symbol that it explains.
 #[derive(Debug, Clone)]
 pub(crate) struct Entry<'a> {
     text: String,
@@ -130,7 +126,6 @@ impl Entry<'_> {
     }
 }
 
-/// One entry per text, in order of first appearance.
 pub(crate) fn entries(panel: &Panel) -> Vec<Entry<'_>> {
     let mut entries: Vec<Entry<'_>> = Vec::new();
     for item in &panel.items {
@@ -190,7 +185,6 @@ pub(crate) fn draw_legend(
     }
 }
 
-/// A marker in the style of `style`, at this place.
 pub(crate) fn draw_marker(drawing: &mut Drawing, (x, y): (f64, f64), style: &Scatter) {
     let size = if style.size_px.is_finite() { style.size_px.clamp(1.0, 60.0) } else { 7.0 };
     let r = size / 2.0;
@@ -240,7 +234,6 @@ const ROOM_PX: f64 = 2.0;
 /// Factor on estimated widths for bold digits, which are wider than letters.
 const BOLD_RATIO: f64 = 1.12;
 
-/// A place for a text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlacedLabel {
     /// Middle, px.
@@ -249,17 +242,14 @@ pub(crate) struct PlacedLabel {
     pub leader: Option<(Px, Px)>,
 }
 
-/// Obstacles for texts.
 pub(crate) struct Surroundings {
     inside: Rect,
-    /// Markers and texts, which no text may cover.
     boxes: Vec<Rect>,
     lines: Vec<(Px, Px)>,
     leaders: Vec<(Px, Px)>,
 }
 
 impl Surroundings {
-    /// The obstacles of a panel, placed texts included.
     pub(crate) fn of(frame: &Frame, items: &[Item], mut boxes: Vec<Rect>) -> Self {
         let mut lines = Vec::new();
         for item in items {

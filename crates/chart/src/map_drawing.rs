@@ -133,8 +133,7 @@ fn place(node: &FittedNode) -> (f64, f64) {
     (node.flow_corrected_kg_s, node.pressure_ratio)
 }
 
-/// The curve of a line between its largest and its smallest measured flow, interpolated at its ends, and above its lowest
-/// efficiency: at choke the flow no longer shows the end of the measured range.
+/// The curve of a line between its measured flows and above its lowest efficiency: at choke the flow shows no end of the range.
 fn between_points(line: &FittedLine, own: &SpeedLine) -> Vec<EtaDrawing> {
     let points = || own.points.iter().filter(|point| point.eta.is_some());
     let flows = || points().map(|point| point.flow_corrected_kg_s);
@@ -173,7 +172,6 @@ fn between_points(line: &FittedLine, own: &SpeedLine) -> Vec<EtaDrawing> {
 /// A line is choked if its flow changes by less than this factor from one measured point to the next.
 const CHOKED_RATIO: f64 = 1.01;
 
-/// The curve between two nodes, interpolated in flow.
 fn at_flow(a: EtaDrawing, b: EtaDrawing, flow_kg_s: f64) -> EtaDrawing {
     let share = (a.flow_corrected_kg_s - flow_kg_s) / (a.flow_corrected_kg_s - b.flow_corrected_kg_s);
     let between = |a: f64, b: f64| a + share * (b - a);
@@ -184,7 +182,6 @@ fn at_flow(a: EtaDrawing, b: EtaDrawing, flow_kg_s: f64) -> EtaDrawing {
     }
 }
 
-/// Style of a line.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stroke {
     pub colour: Colour,
@@ -197,7 +194,6 @@ impl Stroke {
         Stroke { colour, width_px, dash: Dash::Solid }
     }
 
-    /// Width that is drawn, px.
     pub(crate) fn drawn_width_px(&self) -> f64 {
         if self.width_px.is_finite() { self.width_px.clamp(0.1, 20.0) } else { 1.0 }
     }
@@ -214,7 +210,6 @@ impl Stroke {
     }
 }
 
-/// Part of a text that is at its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TextAnchor {
     Start,
@@ -258,11 +253,9 @@ impl TextStyle {
 /// A point of the picture, px from its upper left corner.
 pub(crate) type Px = (f64, f64);
 
-/// An element of a picture.
 #[derive(Debug, Clone)]
 pub(crate) enum Shape {
     OpenGroup(String),
-    /// Starts the note for the shapes up to the next [`Shape::CloseNote`].
     OpenNote(Note),
     CloseNote(Note),
     CloseGroup,
@@ -278,7 +271,6 @@ pub(crate) enum Shape {
     Text(Px, String, TextStyle),
 }
 
-/// A picture: its shapes in drawing order.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Drawing {
     pub width_px: f64,
@@ -288,19 +280,10 @@ pub(crate) struct Drawing {
 }
 
 impl Drawing {
-    pub(crate) fn open_group(&mut self, name: &str) {
-        self.shapes.push(Shape::OpenGroup(name.to_owned()));
-    }
-
-    /// Draws shapes with a note for the mouse, and a link if there is one.
     pub(crate) fn noted(&mut self, note: &Note, draw: impl FnOnce(&mut Drawing)) {
         self.shapes.push(Shape::OpenNote(note.clone()));
         draw(self);
         self.shapes.push(Shape::CloseNote(note.clone()));
-    }
-
-    pub(crate) fn close_group(&mut self) {
-        self.shapes.push(Shape::CloseGroup);
     }
 
     pub(crate) fn line(&mut self, from: Px, to: Px, stroke: &Stroke) {

@@ -8,7 +8,6 @@ use std::fmt::Write;
 use tiny_skia::{Color, FillRule, LineJoin, Paint, Path, PathBuilder, Pixmap, StrokeDash, Transform};
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
-/// Writes the SVG document.
 pub(crate) fn write_document(drawing: &Drawing) -> String {
     let (w, h) = (px(drawing.width_px.ceil()), px(drawing.height_px.ceil()));
     let mut body = String::new();
@@ -279,7 +278,6 @@ fn finite(value: f64) -> f32 {
     if value.is_finite() { value as f32 } else { 0.0 }
 }
 
-/// The regular and the bold font.
 pub(crate) struct Fonts {
     regular: Face<'static>,
     bold: Face<'static>,
@@ -321,14 +319,12 @@ impl Fonts {
     }
 }
 
-/// Kerning between two glyphs, font units.
 fn kerning(face: &Face<'_>, left: GlyphId, right: GlyphId) -> f32 {
     let tables = face.tables().kern.into_iter().flat_map(|kern| kern.subtables);
     let mut horizontal = tables.filter(|table| table.horizontal && !table.variable);
     horizontal.find_map(|table| table.glyphs_kerning(left, right)).map_or(0.0, f32::from)
 }
 
-/// Draws glyphs one after the other, font units.
 struct Pen {
     builder: PathBuilder,
     /// Left end of the next glyph.

@@ -22,22 +22,21 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
 /// Ctrl-C ends the process at once, with its exit code: for work that uses no rig and writes whole files.
 pub fn end_at_once() -> Result<(), Failure> {
     let end = || {
-        standard_output::warn("\nstopped by the operator\n");
+        standard_output::say("\nstopped by the operator\n");
         std::process::exit(Code::Interrupted as i32)
     };
     ctrlc::set_handler(end).map_err(failed)
 }
 
-/// Responds to a signal during a run.
 fn handle_signal(stop: &RunStop, gentle: bool) {
     match stop.handle_signal(gentle) {
         SignalResponse::StopRequested => {}
-        SignalResponse::Deferred => standard_output::warn(
+        SignalResponse::Deferred => standard_output::say(
             "The rig is safe and the recording is complete; its results are being written. Press Ctrl-C again to end without them; `mapper \
              identify` makes them later from the run directory.\n",
         ),
         SignalResponse::MayExit => {
-            standard_output::warn("stopped by the operator\n");
+            standard_output::say("stopped by the operator\n");
             std::process::exit(Code::Interrupted as i32)
         }
     }
@@ -98,7 +97,7 @@ pub fn run_stop() -> Result<RunStop, Failure> {
         Signals::new(ends.into_iter().chain(more_signals()).chain([SIGTSTP])).map_err(failed)?;
     let watch = move || {
         signals.forever().for_each(|signal| match signal {
-            SIGTSTP if raised.uses_rig() => standard_output::warn(
+            SIGTSTP if raised.uses_rig() => standard_output::say(
                 "The run continues, because a suspended program could not protect the rig. Press Ctrl-C to stop the run.\n",
             ),
             // The write that reached the limit has failed and reports it.

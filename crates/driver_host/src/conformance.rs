@@ -267,8 +267,7 @@ fn polling_does_not_change_samples(candidate: &Candidate<'_>) -> CheckResult {
         let cut = pieces.iter().flat_map(|piece| of_piece(piece).unwrap_or_default());
         let scale = column.values.iter().map(|value| value.abs()).fold(0.0, f64::max);
         for ((t_s, cut), value) in times.iter().zip(cut).zip(&column.values) {
-            // A solver step ends at each poll, so pressures and speeds agree only to about its relative tolerance of 1e-6.
-            // Near standstill a relative change of pressure changes the flow some hundred times as much.
+            // A solver step ends at each poll: agreement to about 1e-6; near standstill flows differ some hundred times as much.
             let agrees = (cut - value).abs() <= 3e-4 * scale || (cut.is_nan() && value.is_nan());
             ensure!(agrees, "{} at {t_s} s: {cut} in pieces, {value} in one", column.channel);
         }

@@ -60,16 +60,12 @@ pub struct Driver {
     /// Whether arming was requested and neither refused nor followed by a release, so that this session may own the rig.
     in_doubt: bool,
     queue: SampleQueue,
-    /// Errors in samples since the last poll.
     sample_error: Option<DriverError>,
     now_s: f64,
 }
 
 impl Driver {
     /// Finds the driver called `name`, starts it and sends its settings. `built_in`: names of other backends, for the error message.
-    ///
-    /// # Errors
-    /// [`BackendError::Settings`] if the driver is missing, is not a driver, or refuses its settings.
     pub fn find(
         search_path: &SearchPath,
         name: &str,
@@ -172,7 +168,6 @@ impl Driver {
         Ok(driver)
     }
 
-    /// Exchanges hello messages and returns the driver's version.
     fn greet(&mut self) -> Result<String, BackendError> {
         let hello = Hello {
             magic: MAGIC.to_owned(),
@@ -280,7 +275,6 @@ impl Driver {
         }
     }
 
-    /// Converts a refusal to a rig error.
     fn refusal_error(&self, failure: Failure, call: &'static str) -> BackendError {
         match read_error(failure, &self.name, call, self.now_s) {
             // Before the description arrives no rig can be lost.
@@ -291,7 +285,6 @@ impl Driver {
         }
     }
 
-    /// Processes samples and notes.
     fn process_note(&mut self, method: Option<&str>, params: Value) {
         let (Some(rig), true) = (&self.description, self.sample_error.is_none()) else { return };
         match method {

@@ -185,7 +185,6 @@ pub enum DriverError {
     InvalidMessage(String),
     #[error("the driver does not read its input")]
     NotReading,
-    /// An error reported by the driver.
     #[error("{0}")]
     Message(String),
     #[error(

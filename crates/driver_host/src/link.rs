@@ -32,7 +32,6 @@ pub(crate) struct MessageSender {
 }
 
 impl MessageSender {
-    /// Sends without waiting.
     pub(crate) fn send(&self, message: &Message) -> Result<(), DriverError> {
         let uses_message_pack = self.uses_message_pack.load(Ordering::Relaxed);
         let encoding = if uses_message_pack { Encoding::MessagePack } else { Encoding::Json };
@@ -45,16 +44,13 @@ impl MessageSender {
     }
 }
 
-/// The other end of the link.
 enum Peer {
-    /// A program started for this run, which ends with the run.
     Program(Child),
     /// A driver that was already running.
     #[cfg(unix)]
     Socket(std::os::unix::net::UnixStream),
 }
 
-/// A connection to a driver.
 pub(crate) struct Link {
     peer: Peer,
     sender: Option<MessageSender>,
@@ -127,7 +123,6 @@ impl Link {
         self.sender.as_ref().ok_or_else(|| DriverError::Ended(String::new()))
     }
 
-    /// Sets the maximum frame size of the driver, bytes.
     pub(crate) fn limit_frames(&self, bytes: u32) {
         self.frame_limit.store(bytes, Ordering::Relaxed);
     }
@@ -141,7 +136,6 @@ impl Link {
         }
     }
 
-    /// The driver's final error output, to be appended to a sentence.
     fn last_error_line(&self) -> String {
         // The output has ended, but the final error output may still be on its way.
         let _ = self.stderr_closed.recv_timeout(LAST_OUTPUT_TIMEOUT);
@@ -151,8 +145,7 @@ impl Link {
         line.map_or_else(String::new, |line| format!("; its last error output: {line}"))
     }
 
-    /// Closes the driver's input, which ends the driver or, for a socket, its session. A driver that holds a rig is left to execute its safe
-    /// trajectory. Any other driver is killed or disconnected after `within`.
+    /// Closes the driver's input or session. A driver that holds a rig is left to its safe trajectory; any other is ended after `within`.
     pub(crate) fn close(&mut self, holds_a_rig: bool, within: Duration) {
         self.sender = None;
         let end = Instant::now() + within;
@@ -248,8 +241,7 @@ pub(crate) struct Lease {
 }
 
 impl Lease {
-    /// The lease of this session. Without calls for `silence` it is not renewed, because the runner no longer supervises the rig. `None`: a
-    /// simulation, which may wait.
+    /// The lease of this session, not renewed after `silence` without calls: nobody supervises the rig. `None`: a simulation, which may wait.
     pub(crate) fn new(
         sender: MessageSender,
         session: String,
@@ -292,12 +284,10 @@ const MAX_EVENTS: usize = 10_000;
 /// Number of events above which a driver's notes are dropped.
 const MAX_NOTES: usize = 100;
 
-/// Checked batches in order of arrival, without gaps.
 #[derive(Default)]
 pub(crate) struct SampleQueue {
     batches: VecDeque<SampleBatch>,
     events: Vec<Event>,
-    /// Index of the next sample to arrive and of the next sample to return.
     expected: u64,
     next: u64,
     last_s: Option<f64>,
@@ -307,7 +297,6 @@ pub(crate) struct SampleQueue {
 }
 
 impl SampleQueue {
-    /// Adds a batch.
     pub(crate) fn push(&mut self, mut batch: SampleBatch) -> Result<(), InvalidData> {
         // An event from another clock might never be due. That must not happen to a trip of the rig.
         let latest_s = batch.t_s.last().copied().or(self.last_s).unwrap_or(0.0);

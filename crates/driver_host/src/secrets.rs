@@ -32,9 +32,6 @@ pub(crate) struct Secrets(Vec<String>);
 
 impl Secrets {
     /// Collects the values that `settings` refer to; `variable` reads an environment variable. `needed`: every variable must be set.
-    ///
-    /// # Errors
-    /// The key path and [`DriverError::Secret`] if the settings contain a secret, [`DriverError::NotSet`] for a missing variable.
     pub(crate) fn of(
         settings: &Value,
         variable: &dyn Fn(&str) -> Option<String>,
@@ -86,7 +83,6 @@ impl Secrets {
         Ok(())
     }
 
-    /// Replaces the secrets in a driver's text.
     pub(crate) fn hide(&self, text: &str) -> String {
         self.0.iter().fold(text.to_owned(), |text, secret| {
             if secret.chars().count() < MIN_REPLACED_LENGTH {
@@ -98,7 +94,6 @@ impl Secrets {
     }
 }
 
-/// Whether a key of settings, or of an address, names a secret.
 fn is_secret_key(key: &str) -> bool {
     let key: String = key.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
     let is_pass = key
@@ -122,7 +117,6 @@ fn url_password(text: &str) -> Option<&str> {
     (!password.is_empty()).then_some(password)
 }
 
-/// Replaces a word in a text.
 fn hide_word(text: &str, word: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut from = 0;

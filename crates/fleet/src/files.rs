@@ -9,7 +9,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Errors of reading a study file.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum StudyFileError {
@@ -19,7 +18,6 @@ pub enum StudyFileError {
     Mistakes(Box<Findings>),
 }
 
-/// Errors of a fleet directory.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum FleetError {
@@ -169,7 +167,6 @@ pub struct Machine<'a> {
     pub peak_memory_bytes: &'a (dyn Fn() -> Option<u64> + Sync),
 }
 
-/// Whether a file is flushed to the disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Durability {
     /// Flushed before it gets its name: after a power cut, an existing file is complete.
@@ -210,12 +207,10 @@ pub(crate) fn read_at_most(path: &Path, limit_bytes: usize) -> Result<Vec<u8>, F
     mapper_yaml::read_limited(path, limit_bytes).map_err(FleetError::file("read", path))
 }
 
-/// A name without characters that mean something in a path.
 pub(crate) fn file_name_safe(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
 }
 
-/// Creates a directory and its parents.
 pub(crate) fn make_directory(path: PathBuf) -> Result<PathBuf, FleetError> {
     std::fs::create_dir_all(&path).map_err(FleetError::file("create", &path))?;
     Ok(path)

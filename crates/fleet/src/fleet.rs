@@ -17,14 +17,7 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    pub(crate) fn new(directory: PathBuf, study: Study) -> Self {
-        Fleet { directory, study }
-    }
-
     /// Opens a study that was made by `program`.
-    ///
-    /// # Errors
-    /// [`FleetError::NoStudy`], [`FleetError::OtherProgram`] if another version made it, [`FleetError::Content`].
     pub fn open(directory: &Path, program: &str) -> Result<Fleet, FleetError> {
         let path = directory.join(STUDY);
         if !path.exists() {
@@ -142,19 +135,11 @@ impl<E: std::error::Error> From<E> for WorkError {
 /// Writes a result: named files in a directory that appears only when complete.
 #[derive(Debug)]
 pub struct Output {
-    directory: PathBuf,
+    /// The directory.
+    pub directory: PathBuf,
 }
 
 impl Output {
-    pub(crate) fn new(directory: PathBuf) -> Self {
-        Output { directory }
-    }
-
-    /// The directory.
-    pub fn directory(&self) -> &Path {
-        &self.directory
-    }
-
     /// Writes a file of the result.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), FleetError> {
         let path = self.directory.join(name);
@@ -179,11 +164,7 @@ pub trait Kind: Sync {
     /// Processes one item and returns JSON. Equal payloads give equal results on any computer.
     fn work(&self, payload: &Value, at: WorkContext<'_>) -> Result<String, WorkError>;
 
-    /// Merges the parts, which come one by one in the order of the study, into the result. Returns a one-line description. Missing
-    /// and failed parts are omitted.
-    ///
-    /// # Errors
-    /// [`FleetError`] if a file cannot be written, or a part's result was not made by [`Kind::work`].
+    /// Merges the parts, one by one in the order of the study, without missing and failed ones. Returns a one-line description.
     fn merge(&self, settings: &Value, parts: &mut Results<'_>, out: &Output) -> Result<String, FleetError>;
 }
 
@@ -213,12 +194,7 @@ pub struct CreatedStudy {
 }
 
 impl CreatedStudy {
-    /// Makes the directory of a study. If it holds an earlier state of the same study, items are added and removed, and the parts
-    /// stay. Equal studies give equal bytes.
-    ///
-    /// # Errors
-    /// [`FleetError`]: the study has mistakes, the directory holds another study or that of another version, a file cannot be
-    /// written.
+    /// Makes the directory of a study, or adds and removes items of an earlier state. Equal studies give equal bytes.
     pub fn create(
         study: &StudyFile,
         kind: &dyn Kind,
@@ -264,11 +240,14 @@ impl CreatedStudy {
         // Written last, so that the listed items exist.
         study.write(&directory.join(STUDY), writer)?;
         let kept = study.items.iter().filter(|item| earlier.contains(&item.hash)).count();
-        Ok(CreatedStudy { fleet: Fleet::new(directory.to_owned(), study), new, gone: earlier.len() - kept })
+        Ok(CreatedStudy {
+            fleet: Fleet { directory: directory.to_owned(), study },
+            new,
+            gone: earlier.len() - kept,
+        })
     }
 }
 
-/// The items already in the directory.
 fn existing_items(study: &StudyFile, directory: &Path, program: &str) -> Result<BTreeSet<Hash>, FleetError> {
     match Fleet::open(directory, program) {
         Ok(Fleet { study: found, .. }) if found.name == study.name && found.kind == study.kind => {

@@ -1,5 +1,4 @@
-//! How far a study is: items done, begun and missing, and which of them belong to a shard; and its parts merged into the result, which is the
-//! same for any number of machines and any order of work.
+//! How far a study is, and of each shard; its parts merged into the result, the same for any number of machines and order of work.
 
 use crate::files::{Machine, file_name_safe, make_directory, read_at_most};
 use crate::fleet::part_name;
@@ -169,8 +168,7 @@ pub struct MergeOutcome {
 }
 
 impl Fleet {
-    /// Merges all parts into `result`; with missing or failed parts only if `partial` is set. Only one part is in memory at a
-    /// time. Two concurrent merges write the same bytes.
+    /// Merges all parts into `result`, one in memory at a time; incomplete only if `partial`. Two concurrent merges write the same bytes.
     pub fn merge(
         &self,
         kind: &dyn Kind,
@@ -182,7 +180,7 @@ impl Fleet {
             return Ok(MergeOutcome { status, result: None });
         }
         let new = self.directory().join(format!(".result.{}.new", file_name_safe(machine.name)));
-        let output = Output::new(make_directory(new.clone())?);
+        let output = Output { directory: make_directory(new.clone())? };
         let damaged: RefCell<Vec<UnfinishedItem>> = RefCell::default();
         let mut parts = self.study.items.iter().map(|item| {
             let result = match self.read_part(item) {

@@ -37,7 +37,7 @@ pub struct Study {
     pub layout: u32,
     /// Name.
     pub name: String,
-    /// Kind.
+    /// Its kind.
     pub kind: String,
     /// Program, version and commit.
     pub program: String,
@@ -95,7 +95,7 @@ pub struct StudyFile {
     tree: Tree,
     /// Its name.
     pub name: String,
-    /// Its kind.
+    /// Kind.
     pub kind: String,
 }
 
@@ -173,9 +173,6 @@ impl Item {
     }
 
     /// Reads an item and checks that its hash matches its name.
-    ///
-    /// # Errors
-    /// [`FleetError::File`], [`FleetError::Changed`] if the hash differs, [`FleetError::Content`].
     pub fn read(path: &Path, hash: &Hash) -> Result<Item, FleetError> {
         let bytes = read_at_most(path, MAX_ITEM_BYTES)?;
         if Hash::of(&bytes) != *hash {
@@ -194,9 +191,7 @@ const MAX_BODY_BYTES: u64 = 64 << 20;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// The body is its result.
     Done,
-    /// The body is the reason for the missing result.
     Failed,
 }
 
@@ -212,7 +207,6 @@ pub struct Part {
     pub duration_s: f64,
     /// Peak memory of the process divided by its number of workers, bytes; 0 if unknown.
     pub memory_bytes: u64,
-    /// Length of the body, bytes.
     pub body_bytes: u64,
     /// SHA-256 of the body.
     pub body_sha256: Hash,
@@ -239,7 +233,6 @@ pub enum PartRefusal {
 }
 
 impl Part {
-    /// Writes the outcome of an item.
     pub(crate) fn write(
         path: &Path,
         (hash, item): (&Hash, &Item),

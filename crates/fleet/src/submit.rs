@@ -173,8 +173,7 @@ impl Fleet {
         serde_json::from_slice(&bytes).map_err(FleetError::content(&path, "a submission"))
     }
 
-    /// Refuses a submission while the queue still has tasks of the last one, because each item would be done twice. A queue that does not
-    /// answer counts as empty.
+    /// Refuses a submission while the queue has tasks of the last one: items would be done twice. A silent queue counts as empty.
     fn check_not_queued(&self) -> Result<(), FleetError> {
         let Ok(before) = self.submission() else { return Ok(()) };
         let template = Template { name: before.template, text: before.template_text };
@@ -193,7 +192,6 @@ impl Fleet {
         FleetError::NothingLeft { items: self.study.items.len(), directory: self.directory().to_owned() }
     }
 
-    /// Number of items without a result in the largest shard, for this number of shards.
     fn largest_shard(&self, status: &Status, tasks: u64) -> usize {
         let mut counts = std::collections::BTreeMap::new();
         for item in status.unfinished_items() {
@@ -202,7 +200,6 @@ impl Fleet {
         counts.into_values().max().unwrap_or(0)
     }
 
-    /// Writes the scripts and runs the submission script.
     fn write_and_submit(
         &self,
         mut submission: Submission,
@@ -308,12 +305,10 @@ impl Template {
     }
 }
 
-/// Text quoted as one word of a shell.
 pub(crate) fn shell_quote(text: &str) -> String {
     format!("'{}'", text.replace('\'', r"'\''"))
 }
 
-/// The queue's answer to a submission.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct QueueJobs {
     /// ID of the array job.
@@ -351,8 +346,7 @@ pub(crate) fn run_submission(script: &Path, template: &Template) -> Result<Queue
     }
 }
 
-/// Number of tasks of a job in each state, as the queue reports it; `None` if it does not answer within some seconds.
-/// Nothing depends on the answer.
+/// Number of tasks of a job in each state, for display; `None` if the queue does not answer within some seconds.
 pub fn query_task_states(template: &Template, job: &str) -> Option<BTreeMap<String, usize>> {
     let query = template.state_query()?;
     let mut child = Command::new("sh")

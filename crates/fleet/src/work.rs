@@ -40,12 +40,7 @@ enum ItemOutcome {
 }
 
 impl Fleet {
-    /// Processes the items without a part, and with `again` also the failed ones. An interruption loses only the items in
-    /// progress.
-    ///
-    /// # Errors
-    /// [`FleetError::Interrupted`]; [`FleetError::File`] if a part cannot be written; [`FleetError::Changed`] for an item
-    /// whose file was changed; [`FleetError::NoItem`].
+    /// Processes the items without a part, with `again` also the failed ones. An interruption loses only items in progress.
     pub fn work(
         &self,
         kind: &dyn Kind,
@@ -160,7 +155,6 @@ impl Fleet {
 /// Longest reason that is recorded, characters.
 const MAX_REASON_CHARS: usize = 400;
 
-/// Processes an item in its own directory. A panic fails only this item.
 fn run_item(kind: &dyn Kind, item: &Item, stop: &AtomicBool) -> Result<String, WorkError> {
     let temporary = std::env::temp_dir();
     let scratch = tempfile::Builder::new().prefix("mapper-fleet-").tempdir().map_err(|error| {
@@ -201,11 +195,7 @@ impl Engine<'_> {
         self.jobs.unwrap_or_else(cores).clamp(1, pieces.max(1))
     }
 
-    /// Applies `work` to every piece. Results are in the order of the pieces for any number of jobs. Concurrent pieces share the cores. After
-    /// an error or a stop no further piece starts; pieces that did not start because of a stop are `None`.
-    ///
-    /// # Errors
-    /// That of the first piece whose work fails.
+    /// Applies `work` to every piece, in their order. After an error or a stop no further piece starts; after a stop those are `None`.
     pub fn each<T: Sync, R: Send, E: Send>(
         &self,
         pieces: &[T],

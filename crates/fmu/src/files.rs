@@ -120,9 +120,6 @@ fn write_variable(xml: &mut String, reference: usize, variable: &Variable) -> Re
 }
 
 /// Packs the files of an FMU.
-///
-/// # Errors
-/// [`FmuError::Archive`] or [`FmuError::File`] if the archive cannot hold them.
 pub fn archive(files: &[FmuFile]) -> Result<Vec<u8>, FmuError> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     // No time stamp, so that equal files give equal bytes.
@@ -146,8 +143,7 @@ pub struct FmuFile {
     pub bytes: Vec<u8>,
 }
 
-/// Generates all files of a machine's FMU: the description, then the sources. The GUID is a hash of both, so that equal machines give
-/// equal FMUs.
+/// Generates the description and the sources of an FMU. The GUID is a hash of both, so that equal machines give equal FMUs.
 pub fn files(machine: &FmuMachine<'_>) -> Result<Vec<FmuFile>, FmuError> {
     let (variables, switches) = (variables(machine), switches(machine));
     let header = header(machine, &variables, &switches)?;

@@ -59,7 +59,6 @@ pub const UNITS: &[(&str, &str)] = &[
     ("rpm", r#"rad="1" s="-1" factor="0.10471975511965977""#),
 ];
 
-/// The real variables of a machine.
 #[rustfmt::skip]
 pub fn variables(machine: &FmuMachine<'_>) -> Vec<Variable> {
     let (params, boundary, start) = (machine.params, machine.boundary, machine.start);

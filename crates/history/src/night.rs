@@ -87,8 +87,7 @@ pub struct Night {
     pub runs: Vec<RunRow>,
 }
 
-/// One quantity of a point. Both absolute values and errors are compared, because a changed model shifts truth and result equally and leaves the
-/// error unchanged.
+/// One quantity of a point: values and errors, because a changed model shifts truth and result equally.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PointQuantity {
@@ -164,8 +163,7 @@ impl PointQuantity {
     }
 }
 
-/// Declares the metrics with their names, their descriptions for users, their display units with the factor from the stored value, and the
-/// minimum half widths of their bands.
+/// Declares the metrics: names, descriptions, display units with their factor, and the minimum half widths of their bands.
 macro_rules! metrics {
     ($($(#[doc = $doc:literal])* $metric:ident $name:literal $description:literal $unit:literal $factor:literal $floor:ident $half_width:literal,)*) => {
         /// A metric of a run. Efficiencies are fractions.
@@ -279,8 +277,7 @@ pub struct Band {
 }
 
 impl Band {
-    /// The median -/+ 4 robust standard deviations (from the median absolute deviation), or -/+ the floor if that is wider. Values that are not
-    /// finite are ignored. `None` without values.
+    /// The median -/+ 4 robust standard deviations, or -/+ the floor if that is wider; of finite values. `None` without any.
     pub fn of(values: &[f64], floor: Floor) -> Option<Band> {
         let values: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
         let median = median(&values)?;

@@ -100,9 +100,6 @@ impl History {
     }
 
     /// Opens an existing history for reading.
-    ///
-    /// # Errors
-    /// [`HistoryError::Missing`] if there is none, otherwise as [`History::open`].
     pub fn open_existing(path: &Path) -> Result<History, HistoryError> {
         if !path.exists() {
             return Err(HistoryError::Missing(path.to_owned()));
@@ -140,7 +137,6 @@ impl History {
         Ok(History { connection, path: path.to_owned() })
     }
 
-    /// Creates the tables in a new file; rejects other databases.
     fn prepare(&mut self) -> Result<(), HistoryError> {
         let path = self.path.clone();
         let fail = |source: rusqlite::Error| match source.sqlite_error_code() {
@@ -186,11 +182,7 @@ impl History {
         transaction.commit().map_err(fail)
     }
 
-    /// Compares a night with the band of the last `nights` nights and appends it, in one transaction. Marks the night as moved or accepted. Nights
-    /// are identified by their start time; a second one in the same millisecond gets the next free time.
-    ///
-    /// # Errors
-    /// [`HistoryError::NoSpace`] and [`HistoryError::Sqlite`]; the history is then unchanged.
+    /// Compares a night with the band of the last `nights` and appends it, in one transaction, at its start time or the next free millisecond.
     pub fn append(&mut self, night: &mut Night, nights: usize) -> Result<Comparison, HistoryError> {
         let path = self.path.clone();
         self.try_append(night, nights).map_err(|source| HistoryError::of_sqlite(&path, source))
@@ -284,13 +276,11 @@ impl History {
     }
 }
 
-/// Application ID and layout version of a database.
 fn read_layout(connection: &Connection) -> rusqlite::Result<(i32, i32)> {
     let read = |pragma| connection.pragma_query_value(None, pragma, |row| row.get(0));
     Ok((read("application_id")?, read("user_version")?))
 }
 
-/// A point from the columns that begin at `first`.
 fn read_point_row(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<PointRow> {
     Ok(PointRow {
         speed_rpm: row.get(first)?,
@@ -319,7 +309,6 @@ fn insert_run() -> String {
     )
 }
 
-/// A run from the columns that begin at `first`.
 fn read_run_row(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<RunRow> {
     let mut figures = BTreeMap::new();
     for (index, figure) in Metric::ALL.into_iter().enumerate() {
@@ -373,7 +362,6 @@ fn read_earlier_runs(
     Ok(earlier)
 }
 
-/// Whether the file or its directory is not writable.
 fn is_read_only(error: &rusqlite::Error) -> bool {
     use rusqlite::ErrorCode;
     let code = error.sqlite_error_code();
@@ -407,7 +395,6 @@ pub enum HistoryError {
     Directory(PathBuf, #[source] std::io::Error),
     #[error("there is no history at {}; run a nightly campaign to make one, or name another file", .0.display())]
     Missing(PathBuf),
-    /// The file is a database of something else, or of a newer program.
     #[error("{} is not a history that this program can read: {reason}; name another file", .path.display())]
     Foreign { path: PathBuf, reason: String },
     #[error("the history {} cannot be written; check the permissions, or name another file", .0.display())]

@@ -129,8 +129,7 @@ impl Likelihood {
         Likelihood { precision, precision_mean }
     }
 
-    /// Adds a balance whose errors are independent of those of the others. Returns `None` and adds nothing if its covariance is not positive
-    /// definite, a number is not finite or the shapes do not agree.
+    /// Adds a balance with independent errors. `None` if its covariance is not positive definite, a number is not finite or shapes differ.
     pub fn add(&mut self, balance: &Balance) -> Option<()> {
         let Balance { residual, covariance, columns } = balance;
         let rows = residual.len();
@@ -200,8 +199,7 @@ impl Likelihood {
         Some(priors.hypotheses.iter().enumerate().filter_map(single).collect())
     }
 
-    /// Smallest size of a hypothesis that can be detected: its expected residuals make its family as probable as no hypothesis at all;
-    /// infinite if no size does.
+    /// Smallest detectable size: its expected residuals make its family as probable as no hypothesis at all; infinite if none does.
     pub fn smallest_seen(&self, priors: &Priors, index: usize) -> Option<f64> {
         let marginal = self.marginalise(&priors.always)?;
         let family = priors.hypotheses[index].family;
@@ -309,8 +307,7 @@ impl SetSearch<'_> {
 
     /// Changes one member at a time until no change makes the set more probable.
     fn climb(&self, mut members: Vec<usize>) -> Vec<usize> {
-        // Each member is added, replaced and removed once. If every family is one hypothesis, the search ends by itself, since each change
-        // makes the set more probable.
+        // Each member is added, replaced and removed once. With single-hypothesis families the search ends by itself: each change improves it.
         for _ in 0..MAX_MEMBERS * MAX_MEMBERS {
             let Some(better) = self.better(&members) else { break };
             members = better;
@@ -379,7 +376,6 @@ impl SetSearch<'_> {
     }
 }
 
-/// ln(exp(a) + exp(b)).
 fn ln_sum(a: f64, b: f64) -> f64 {
     let (large, small) = (a.max(b), a.min(b));
     if small == f64::NEG_INFINITY { large } else { large + (small - large).exp().ln_1p() }

@@ -52,8 +52,7 @@ pub struct Mixture {
 }
 
 impl Mixture {
-    /// Evaluates all sets. `mean` and `covariance` are those of the parameters' distances from neutral, from a fit with all of them free.
-    /// `None` if a number is not finite, the covariance is not positive definite, or its size is another.
+    /// Evaluates all sets from a fit (distances from neutral) with all parameters free. `None` if it is not finite or positive definite.
     pub fn of(mean: &DVector<f64>, covariance: &DMatrix<f64>, parameters: &[Parameter]) -> Option<Self> {
         let count = parameters.len();
         if mean.len() != count || covariance.shape() != (count, count) {
@@ -122,7 +121,6 @@ struct Likelihood {
 }
 
 impl Likelihood {
-    /// Removes the prior of the fit.
     fn of(mean: &DVector<f64>, covariance: &DMatrix<f64>, parameters: &[Parameter]) -> Option<Self> {
         let mut precision = covariance.clone().cholesky()?.inverse();
         let precision_mean = &precision * mean;
@@ -132,7 +130,6 @@ impl Likelihood {
         Some(Likelihood { precision, precision_mean })
     }
 
-    /// The likelihood widened by the errors of the model.
     fn with_model_errors(&self, parameters: &[Parameter]) -> Option<Self> {
         let errors =
             DVector::from_iterator(parameters.len(), parameters.iter().map(|p| p.model_error.powi(2)));
@@ -181,7 +178,6 @@ impl Likelihood {
         Some(0.5 * precision_mean.dot(&mean) + ln_volume - prior + mass.max(f64::MIN_POSITIVE).ln())
     }
 
-    /// Appends draws of a set.
     fn draw(
         &self,
         free: &[usize],

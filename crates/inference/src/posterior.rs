@@ -69,8 +69,7 @@ impl Rules {
         -EXCLUDED_ODDS.ln() * self.temperature
     }
 
-    /// Probabilities of `sets`, most probable first. `none`: ln of the weight of no cause. `unmodelled`: probability of a cause that nobody
-    /// modelled.
+    /// Probabilities of `sets`, most probable first. `none`: ln of the weight of no cause; `unmodelled`: probability of an unmodelled cause.
     pub fn cause_probabilities(&self, none: f64, sets: &[CauseSet], unmodelled: f64) -> CauseProbabilities {
         let ln_weights = std::iter::once(none).chain(sets.iter().map(|set| set.ln_weight));
         let shares = shares(&ln_weights.collect::<Vec<_>>(), self.temperature);
@@ -138,14 +137,12 @@ const MAX_CELLS: f64 = 4096.0;
 /// Coverage of all reported intervals. Source: the usual coverage of measurement uncertainty (GUM, JCGM 100, 6.3).
 pub const COVERAGE: f64 = 0.95;
 
-/// Whether data carry more information about a parameter than its prior, from the widths (or errors) after and before them; otherwise the prior
-/// dominates. Precisions add up, so the width falls to less than the root of a half.
+/// Whether data tell more of a parameter than its prior: precisions add up, so the width (or error) falls below the root of a half.
 pub fn is_identified(after: f64, before: f64) -> bool {
     2.0 * after * after < before * before
 }
 
-/// Shortest interval that contains `coverage` of the mixture of normal distributions about `centres` (weight, value), each with the
-/// standard deviation `sigma`. `None` if there are no centres or a number is not finite.
+/// Shortest interval with `coverage` of normals about `centres` (weight, value), each of `sigma`. `None` without centres or finite numbers.
 pub fn shortest(centres: &[(f64, f64)], sigma: f64, coverage: f64) -> Option<(f64, f64)> {
     let (low, high) = range(centres.iter().map(|(_, x)| *x));
     if !(low.is_finite() && high.is_finite() && sigma.is_finite()) {

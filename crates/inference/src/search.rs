@@ -122,8 +122,7 @@ pub fn climb<C: Causes>(causes: &C, known: &mut Known<C::Fit>, start: &C::Fit, l
     climb_beyond(causes, known, start, limits, BTreeSet::new(), &mut BTreeMap::new());
 }
 
-/// Like [`climb`]; the sets with one cause more than a set in `extended` are known already. `reduced` has the sets whose subsets are fitted, with
-/// the ln of odds (in bits) of the fit from which they were.
+/// As [`climb`]; supersets by one of those in `extended` are known. `reduced`: sets with fitted subsets, and the ln of odds of that fit.
 fn climb_beyond<C: Causes>(
     causes: &C,
     known: &mut Known<C::Fit>,

@@ -27,20 +27,16 @@ pub(crate) struct State {
     pub(crate) machine: String,
     campaign: String,
     pub(crate) units: DisplayUnits,
-    /// Names of the speed lines, from slow to fast.
     pub(crate) lines: Vec<String>,
     /// Expected points on the map.
     planned: Vec<Planned>,
     steps: usize,
-    /// Planned rig time, s.
     duration_s: f64,
     pace: Option<f64>,
-    /// Names and units of the columns of `rows`.
     traced: Vec<TracedChannel>,
     /// Run time, s, and readings.
     rows: VecDeque<Vec<Option<f64>>>,
     pub(crate) points: Vec<LivePoint>,
-    /// Speed lines and contours of the points so far.
     pub(crate) map: LiveMap,
     pub(crate) events: VecDeque<LoggedMessage>,
     pub(crate) now: CurrentValues,
@@ -60,11 +56,9 @@ pub(crate) struct LoggedMessage {
     pub(crate) message: String,
 }
 
-/// Values that change every second.
 #[derive(Debug, Clone, Default, Serialize)]
 pub(crate) struct CurrentValues {
     pub(crate) t_s: f64,
-    /// Current activity, in words.
     phase: String,
     pub(crate) step: Option<Step>,
     /// Remaining rig time and half-width of its 95 % interval, s.
@@ -75,7 +69,6 @@ pub(crate) struct CurrentValues {
     pub(crate) readings: Vec<Reading>,
 }
 
-/// The current step.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Step {
     /// Its number, from 1; `None` for one that a resumed run repeats.
@@ -87,14 +80,12 @@ pub(crate) struct Step {
     settle_s: Option<f64>,
 }
 
-/// A channel with its reading and its limits.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Reading {
     symbol: &'static str,
     pub(crate) what: &'static str,
     pub(crate) unit: String,
     pub(crate) value: f64,
-    /// The value formatted as in reports.
     shown: String,
     low: Option<f64>,
     high: Option<f64>,
@@ -122,7 +113,6 @@ pub struct LiveRun<'a> {
     pub now: Arc<AtomicBool>,
 }
 
-/// Keeps the state and returns its changes.
 pub(crate) struct Feed {
     current: Mutex<FeedState>,
     display: Display,
@@ -162,7 +152,7 @@ impl Feed {
         let state = State {
             machine: run.campaign.machine.name.clone(),
             campaign: run.campaign.name.clone(),
-            units: display.units().clone(),
+            units: display.units.clone(),
             lines,
             planned: planned(run.campaign, run.plan, &display),
             steps: run.plan.steps.len(),
@@ -211,7 +201,6 @@ impl Feed {
         message("snapshot", json!(current.state))
     }
 
-    /// Processes an event and returns messages for the observers.
     pub(crate) fn process(&self, event: &SessionEvent) -> Vec<Arc<str>> {
         // Called on the identification thread, so that the rig does not wait for the map.
         let map = match event {
@@ -302,7 +291,6 @@ impl Feed {
         }
     }
 
-    /// The map with one additional point.
     fn map_with(&self, point: &IdentifiedPoint) -> Option<LiveMap> {
         let mut estimated = self.estimated.lock().ok()?;
         if estimated.len() < MAX_POINTS {
@@ -311,7 +299,6 @@ impl Feed {
         Some(live_map(&estimated, &self.campaign, &self.display))
     }
 
-    /// Shows a pressed button before the run has processed it.
     pub(crate) fn show_command(&self, command: OperatorCommand) {
         if let Ok(mut current) = self.current.lock() {
             current.held |= command == OperatorCommand::Hold;
@@ -324,7 +311,6 @@ impl Feed {
         }
     }
 
-    /// Shows the end of the run.
     pub(crate) fn show_end(&self, outcome: &str, page: Option<&Path>) -> Arc<str> {
         let Ok(mut current) = self.current.lock() else { return Arc::from("{}") };
         current.state.outcome = Some(outcome.to_owned());
@@ -343,7 +329,7 @@ impl Feed {
             let line = target_line_name(to.speed_rpm, &self.campaign, &self.display);
             format!(
                 "{line} {}, valve area {}",
-                self.display.units().speed,
+                self.display.units.speed,
                 valve_area_text(to.valve_opening_ratio)
             )
         });

@@ -25,9 +25,6 @@ pub struct Live {
 
 impl Live {
     /// Binds an address. Browsers on other machines need the token that this creates.
-    ///
-    /// # Errors
-    /// [`LiveError`] if the address is in use, or the TLS files are unusable.
     pub fn open(address: SocketAddr, tls: Option<&TlsFiles>) -> Result<Live, LiveError> {
         let tls = tls.map(read).transpose()?;
         let listen = |source| LiveError::Listen(address, source);
@@ -124,7 +121,6 @@ impl Live {
     }
 }
 
-/// A random token of 128 bits.
 fn token() -> Result<String, LiveError> {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).map_err(LiveError::Token)?;

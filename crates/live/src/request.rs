@@ -1,5 +1,4 @@
-//! Reads one request from an untrusted client, and decides what it may do: the addresses that are served, and access control for the page and its
-//! buttons.
+//! Reads one request from an untrusted client, and decides what it may do: served addresses, access control for page and buttons.
 
 use std::io::Read;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -12,7 +11,6 @@ const MAX_HEADERS: usize = 64;
 /// Maximum time for a request to arrive.
 pub(crate) const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// The fields of a request that are used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Request {
     pub(crate) method: String,
@@ -57,9 +55,6 @@ fn convert_request(parsed: &httparse::Request<'_, '_>) -> Option<Request> {
 }
 
 /// An address with its port, `localhost` with a port, or a port of this computer, from a command line.
-///
-/// # Errors
-/// The remedy, for any other text.
 pub fn parse_address(text: &str) -> Result<SocketAddr, String> {
     let (host, port) = text.rsplit_once(':').unwrap_or(("localhost", text));
     let address = if host.eq_ignore_ascii_case("localhost") {
@@ -72,7 +67,6 @@ pub fn parse_address(text: &str) -> Result<SocketAddr, String> {
     })
 }
 
-/// Requirements for a request.
 #[derive(Debug, Clone)]
 pub(crate) struct Access {
     /// The token, required on every address except the loopback address.
@@ -84,7 +78,6 @@ pub(crate) struct Access {
 }
 
 impl Access {
-    /// Rules for a server at this address.
     pub(crate) fn new(address: SocketAddr, token: Option<String>, encrypted: bool) -> Self {
         let port = address.port();
         let local_names = ["127.0.0.1", "localhost", "[::1]"].map(|name| format!("{name}:{port}"));

@@ -17,16 +17,12 @@ const HEARTBEAT: Duration = Duration::from_secs(2);
 const HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
                        X-Frame-Options: DENY\r\nConnection: close\r\n";
 
-/// Command of a button.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum OperatorCommand {
-    /// Hold the current step.
     Hold,
-    /// Continue after a hold.
     Continue,
     /// Stop the run at the end of the step.
     StopAfterStep,
-    /// Go to the safe state now.
     SafeNow,
 }
 
@@ -34,17 +30,12 @@ pub(crate) struct ServedContent {
     pub(crate) page: String,
     pub(crate) access: Access,
     pub(crate) hub: Hub,
-    /// TLS settings, if the page uses TLS.
     pub(crate) tls: Option<Tls>,
-    /// The complete state as a message.
     pub(crate) snapshot: Box<dyn Fn() -> Arc<str> + Send + Sync>,
-    /// Executes a button command.
     pub(crate) ask: Box<dyn Fn(OperatorCommand) + Send + Sync>,
-    /// The open connections.
     pub(crate) connections: Arc<Connections>,
 }
 
-/// Serves until the process ends.
 pub(crate) fn serve(listener: &TcpListener, served: &Arc<ServedContent>) {
     for stream in listener.incoming().filter_map(Result::ok) {
         let Some(connection) = served.connections.admit(&stream) else { continue };
@@ -154,7 +145,6 @@ fn events(stream: &mut impl Write, served: &ServedContent, connection: &Connecti
 /// within milliseconds of connecting, so a button works even if other clients keep connections open.
 const MAX_BRIEF_CONNECTIONS: usize = 32;
 
-/// All open connections.
 #[derive(Debug, Default)]
 pub(crate) struct Connections {
     open: Mutex<Vec<OpenConnection>>,
@@ -186,8 +176,7 @@ fn leaves_first(addresses: &[Option<IpAddr>]) -> Option<usize> {
 }
 
 impl Connections {
-    /// Adds a connection. If there are too many short connections, the oldest one of the address with the most of them is closed. `None` if the connection
-    /// is already closed.
+    /// Adds a connection; with too many short ones, the oldest of the busiest address is closed. `None` if it is closed already.
     pub(crate) fn admit(self: &Arc<Connections>, stream: &TcpStream) -> Option<Connection> {
         let (address, own_stream) = (stream.peer_addr().ok()?.ip(), stream.try_clone().ok()?);
         let mut open = self.lock();
@@ -215,7 +204,6 @@ impl Connections {
 }
 
 impl Connection {
-    /// Marks an accepted stream, which is never replaced.
     pub(crate) fn mark_as_stream(&self) {
         if let Some(open) = self.all.lock().iter_mut().find(|connection| connection.number == self.number) {
             open.brief = None;
@@ -262,7 +250,6 @@ impl Hub {
         }
     }
 
-    /// Disconnects all browsers after their queued messages.
     pub(crate) fn close(&self) {
         if let Ok(mut clients) = self.clients.lock() {
             clients.clear();

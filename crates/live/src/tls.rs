@@ -73,7 +73,6 @@ mod with {
     #[derive(Clone)]
     pub(crate) struct Tls(Arc<ServerConfig>);
 
-    /// Reads both files and checks that they match.
     pub(crate) fn read(files: &TlsFiles) -> Result<Tls, TlsError> {
         let file =
             |path: &std::path::Path, what, why: String| TlsError::File { path: path.to_owned(), what, why };
@@ -118,7 +117,7 @@ mod with {
 
 #[cfg(not(feature = "tls"))]
 mod without {
-    use SUPER1::{DeadlineStream, TlsError, TlsFiles};
+    use super::{DeadlineStream, TlsError, TlsFiles};
 
     /// Placeholder for builds without TLS.
     #[derive(Clone)]

@@ -1,5 +1,4 @@
-//! Numbers, durations and values in the display units of a campaign, as text; sentences of typed warnings, remarks and findings, each with its
-//! words in one place of this crate, as its [`Message`].
+//! Numbers, durations and values in display units as text; sentences of typed warnings, remarks and findings, as their [`Message`].
 
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_campaign::units::Kind;
@@ -44,18 +43,14 @@ pub fn short_duration(duration_s: f64) -> String {
 /// Formatter of values in the display units.
 #[derive(Debug, Clone, Default)]
 pub struct Display {
-    units: DisplayUnits,
+    /// The display units.
+    pub units: DisplayUnits,
 }
 
 impl Display {
     /// The campaign's display units.
     pub fn new(units: &DisplayUnits) -> Self {
         Display { units: units.clone() }
-    }
-
-    /// The units.
-    pub fn units(&self) -> &DisplayUnits {
-        &self.units
     }
 
     /// The display unit of a kind; empty for a kind that is shown as it is.
@@ -78,7 +73,6 @@ impl Display {
         }
     }
 
-    /// A value in its display unit, without the unit.
     fn shown(&self, kind: Kind, inside: f64) -> String {
         let decimals = match (kind, self.unit(kind)) {
             (Kind::Speed, "krpm") => 2,
@@ -121,9 +115,9 @@ impl Display {
         Some(shown).filter(|shown| shown.is_finite() && *shown != 0.0)
     }
 
-    /// Column head: name, and the unit of speeds.
-    pub fn speed_head(&self, name: &str) -> String {
-        format!("{name} {}", self.units.speed)
+    /// Column head: name, and the unit of a kind.
+    pub fn head(&self, name: &str, kind: Kind) -> String {
+        format!("{name} {}", self.unit(kind))
     }
 
     /// A shaft speed.
@@ -152,29 +146,14 @@ impl Display {
         format!("{} @ {}", self.speed(point.speed_rpm), valve_area_text(point.valve_opening_ratio))
     }
 
-    /// Column head: name, and the unit of pressures.
-    pub fn pressure_head(&self, name: &str) -> String {
-        format!("{name} {}", self.units.pressure)
-    }
-
     /// A pressure.
     pub fn pressure(&self, pressure_pa: f64) -> String {
         self.shown(Kind::Pressure, pressure_pa)
     }
 
-    /// Column head: name, and the unit of flows.
-    pub fn flow_head(&self, name: &str) -> String {
-        format!("{name} {}", self.units.flow)
-    }
-
     /// A mass flow.
     pub fn flow(&self, flow_kg_s: f64) -> String {
         self.shown(Kind::MassFlow, flow_kg_s)
-    }
-
-    /// Column head: name, and the unit of temperatures.
-    pub fn temperature_head(&self, name: &str) -> String {
-        format!("{name} {}", self.units.temperature)
     }
 
     /// A temperature.
@@ -244,7 +223,6 @@ pub(crate) fn range_text(values: impl Iterator<Item = f64>, factor: f64, digits:
     }
 }
 
-/// A number with four significant figures.
 pub fn four_figures(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");

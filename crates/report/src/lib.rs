@@ -41,9 +41,8 @@ pub use plan::plan_document::{
     comparison_json, jump_forecast, jump_json, plan_comparison, plan_document, plan_svg,
 };
 pub use plan::plan_remark_text::guard_trip_text;
-pub use point_results::budget_table::budget_csv;
+pub use point_results::point_tables::{budget_csv, wheel_coefficients};
 pub use point_results::summary::PointResults;
-pub use point_results::wheel_table::wheel_coefficients;
 pub use side_diagnosis::why_figure;
 pub use test_report::key_figures::{PointsOrigin, first_campaign};
 pub use test_report::run_report::{ReportSource, RunReport, instant};

@@ -139,7 +139,6 @@ fn proposed_map(layout: &Layout, proposal: &Proposal) -> Document {
     document
 }
 
-/// A name shortened for a table.
 fn cut(name: &str) -> String {
     let clean: String = name.chars().take(40).map(|c| if c.is_control() { '?' } else { c }).collect();
     if name.chars().count() > 40 { format!("{clean}...") } else { clean }

@@ -14,7 +14,6 @@ use mapper_maps::{
 };
 use mapper_numerics::statistics::mean;
 
-/// The columns, the speed lines, and a sentence for each assumption.
 impl Describe for ImportedMap {
     fn document(&self) -> Document {
         let map = &self.map;
@@ -46,7 +45,6 @@ impl Describe for ImportedMap {
     }
 }
 
-/// Adds how many points are good, and why the others are not.
 fn add_verdicts(document: &mut Document, map: &CompressorMap) {
     let points = || map.lines.iter().flat_map(|line| &line.points).map(|point| &point.identified);
     let reasons = reasons(points());
@@ -135,7 +133,6 @@ impl Message for ImportRemark {
     }
 }
 
-/// A row for each line and sentences below.
 impl Describe for MapComparison {
     fn document(&self) -> Document {
         let comparison = self;
@@ -277,7 +274,6 @@ pub fn map_fit(map: &CompressorMap, fitted: &FittedMap) -> Document {
     document
 }
 
-/// Points of a line, by its speed.
 fn points_of(map: &CompressorMap, speed_corrected_rpm: f64) -> f64 {
     let line = map.lines.iter().find(|line| line.speed_corrected_rpm == speed_corrected_rpm);
     line.map_or(0.0, |line| line.points.len() as f64)
@@ -356,7 +352,6 @@ fn sources(budgets: &[PointBudgets]) -> Table {
     table
 }
 
-/// The columns, the speed lines, and a sentence for each assumption.
 impl Describe for ImportedTurbine {
     fn document(&self) -> Document {
         let mut document = Document::default();
@@ -449,7 +444,6 @@ pub fn turbine_fit(map: &TurbineMap, fitted: &FittedTurbine) -> Document {
     document
 }
 
-/// The differences between two maps.
 impl Describe for TurbineComparison {
     fn document(&self) -> Document {
         let comparison = self;

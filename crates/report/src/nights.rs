@@ -224,7 +224,6 @@ pub fn study_status(name: &str, status: &Status, queue: Option<&BTreeMap<String,
     document
 }
 
-/// Every item without a result, and the files that were left out.
 fn add_lacking(document: &mut Document, status: &Status, shown: impl Fn(&UnfinishedItem) -> bool) {
     for (items, state) in [(&status.failed, "failed"), (&status.refused, "invalid part")] {
         list(document, items, |item| {
@@ -246,7 +245,6 @@ fn list<T>(document: &mut Document, items: &[T], line: impl Fn(&T) -> String) {
     document.list(items.iter().take(SHOWN).map(line).chain(more));
 }
 
-/// The merged result and the missing items.
 impl Describe for MergeOutcome {
     fn document(&self) -> Document {
         let (status, mut document) = (&self.status, Document::default());
@@ -269,7 +267,6 @@ impl Describe for MergeOutcome {
     }
 }
 
-/// Items, processor hours, memory, disk.
 impl Describe for Cost {
     fn document(&self) -> Document {
         let memory = match self.memory_bytes {
@@ -293,7 +290,6 @@ impl Describe for Cost {
     }
 }
 
-/// Job numbers, tasks, limits.
 impl Describe for Submission {
     fn document(&self) -> Document {
         let mut document = Document::default();

@@ -64,7 +64,6 @@ pub fn error_figure(machine: &str, points: &[ScoredPoint]) -> Option<Figure> {
         .subtitle("Against the simulator's truth; bars are the 95 % intervals that the identification gives, cut at the frame."))
 }
 
-/// Adds the good and the doubtful points to a panel.
 pub(crate) fn add_by_verdict(panel: &mut Panel, points: &[(Verdict, ScatterPoint)]) {
     for (verdict, colour, marker, name) in [
         (Verdict::Good, palette::BLUE, Marker::Circle, "good"),
@@ -227,8 +226,7 @@ fn dates(first_ms: i64, last_ms: i64) -> Vec<(f64, String)> {
         .collect()
 }
 
-/// All figures as one SVG. The tooltip shows night, figure and value. A click opens the page that `report_of` names for a night that
-/// began then, ms since 1970.
+/// All figures as one SVG with tooltips. A click opens the page that `report_of` names for a night that began then, ms since 1970.
 pub fn history_svg(
     runs: &[ListedRun],
     figures: &[Metric],

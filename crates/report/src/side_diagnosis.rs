@@ -106,7 +106,6 @@ fn headline(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// With a capital first letter.
 fn capitalise(words: &str) -> String {
     let mut letters = words.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
@@ -145,7 +144,6 @@ fn causes(diagnosis: &Diagnosis) -> Table {
     table
 }
 
-/// Three figures.
 fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");

@@ -13,7 +13,6 @@ use mapper_physics::machine::params::Params;
 use serde::Serialize;
 use serde_json::json;
 
-/// One row for each number, and sentences on the fit.
 impl Describe for ThermalModel {
     fn document(&self) -> Document {
         let mut rows: Vec<(String, String)> = Vec::new();
@@ -183,9 +182,6 @@ impl AtReference {
 
 impl ThermalExport<'_> {
     /// One JSON object; keys carry units, and declared values that the recording did not give are marked `declared`.
-    ///
-    /// # Errors
-    /// That of serde_json; numbers and texts never fail.
     pub fn json(&self) -> Result<Vec<u8>, serde_json::Error> {
         let (params, compressor) = (self.params, &self.params.compressor);
         let mut file = json!({

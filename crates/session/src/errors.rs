@@ -63,10 +63,8 @@ pub enum SessionError {
     Nightly(#[from] NightlyError),
     #[error("{}: the points of a script may differ between nights; replace `sequence` by a grid", .0.display())]
     NightlySequence(PathBuf),
-    /// Two runs of a night have the same campaign, machine, method and seed.
     #[error("{0} appears twice in the nightly campaign; give each campaign its own name")]
     DuplicateNightlyRun(String),
-    /// Rows of a study do not match the runs of this night.
     #[error("the study does not belong to this nightly campaign: {0}; make a new study")]
     NightlyMismatch(String),
     #[error(transparent)]
@@ -82,7 +80,6 @@ pub enum SessionError {
     DifferentCampaigns { first: PathBuf, other: PathBuf, differs: &'static str },
     #[error("recordings that are identified together need the same channel map; identify each separately")]
     DifferentChannelMaps,
-    /// With the reasons.
     #[error("the points make no map: {0}")]
     NoMap(String),
     #[error(
@@ -99,7 +96,6 @@ pub enum SessionError {
     NotAPlan(PathBuf, #[source] serde_json::Error),
     #[error("{} is stale: {} changed since it was made; make a new plan", .path.display(), .changed.join(" and "))]
     StalePlan { path: PathBuf, changed: Vec<&'static str> },
-    /// The name of the backend or its settings are wrong.
     #[error(transparent)]
     Backend(BackendError),
     /// `at`: key path of the instrument in the campaign; `setting`: path below it if one of the backend's own settings is wrong.
@@ -107,7 +103,6 @@ pub enum SessionError {
     Reader { at: String, setting: String, source: mapper_core::BackendCause },
     #[error("{} is not a valid plan: {why}; make a new plan", .path.display())]
     InvalidPlan { path: PathBuf, why: String },
-    /// With what is known about the recording.
     #[error("no point was identified: no step of the recording is long enough. {0}")]
     NoPoints(String),
     #[error("{} and {} contain the same readings, whose noise would count as independent evidence; give each recording once",
@@ -117,7 +112,6 @@ pub enum SessionError {
     SeveralRecordings(PathBuf),
     #[error("{} cannot be resumed: {why}", .run.display())]
     NotResumable { run: PathBuf, why: String },
-    /// The journal and the recordings of a run disagree.
     #[error("{}: the journal lists steps that no recording contains: {lost}. Restore the file, or run these steps again", .run.display())]
     LostSteps { run: PathBuf, lost: String },
     #[error("the rig `{rig}` is in use by {owner}; wait until that run ends, or stop it")]
@@ -131,13 +125,11 @@ pub enum SessionError {
         "the rig `{rig}` has been locked out{}: {reason}. Inspect the rig; then acknowledge that it is safe", since_text(.run)
     )]
     RigLockedOut { rig: String, reason: String, run: PathBuf },
-    /// A file that may mean this rig or another one.
     #[error("the rig `{rig}` has been locked out: {reason}")]
     RigFileDoubtful { rig: String, reason: String },
     /// `awaiting`: rigs that wait for acknowledgement.
     #[error("the rig `{rig}` needs no acknowledgement, or there is no rig of that name; {}", awaiting_text(.awaiting))]
     NothingToAcknowledge { rig: String, awaiting: Vec<String> },
-    /// The rig could not be armed, so the run did not start.
     #[error(transparent)]
     NotArmed(RunError),
     #[error("the run was not started: {0}")]
@@ -154,7 +146,6 @@ pub enum SessionError {
     Run { source: RunError, recording: PathBuf },
     #[error(transparent)]
     Sequence(#[from] SequenceError),
-    /// A sequence script failed at one of its steps.
     #[error(transparent)]
     Script(StepSourceError),
     #[error("the rehearsal failed: {0}")]
@@ -241,7 +232,6 @@ pub fn since_text(run: &Path) -> String {
     if run.as_os_str().is_empty() { String::new() } else { format!(" since the run {}", run.display()) }
 }
 
-/// The rigs that wait for acknowledgement.
 fn awaiting_text(rigs: &[String]) -> String {
     match rigs {
         [] => "no rig waits for one".to_owned(),
@@ -250,7 +240,6 @@ fn awaiting_text(rigs: &[String]) -> String {
 }
 
 impl SessionError {
-    /// A file that could not be read, written or created.
     pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         move |source| match source.kind() {
@@ -273,67 +262,88 @@ impl SessionError {
 
     /// The input that the error is about; `None` for any other than a campaign or a recording.
     pub fn input(&self) -> Option<Input> {
-        use SessionError as E;
-        match self {
-            E::ChannelMap(_)
-            | E::Record(_)
-            | E::Log(_)
-            | E::LogOption(_)
-            | E::SameRecording { .. }
-            | E::NoRecording => Some(Input::Recording),
-            E::Identify(_)
-            | E::NoPoints(_)
-            | E::NoMap(_)
-            | E::OtherMachine(_)
-            | E::MachineUnknown { .. }
-            | E::DifferentCampaigns { .. }
-            | E::Method(..)
-            | E::Drift(_)
-            | E::Driven(_)
-            | E::Gap(_) => Some(Input::RecordedData),
-            E::Campaign(_)
-            | E::Model(_)
-            | E::Plan(_)
-            | E::NoSteps(_)
-            | E::Sequence(_)
-            | E::Script(_)
-            | E::Rehearsal(_)
-            | E::RehearsalTripped { .. }
-            | E::Backend(_)
-            | E::Reader { .. }
-            | E::FirstMap(_)
-            | E::MissingGuards { .. }
-            | E::GuardWithoutChannel { .. } => Some(Input::Campaign),
-            _ => None,
-        }
+        self.kind_and_input().1
     }
 
     /// Category of the error.
     pub fn kind(&self) -> ErrorKind {
+        self.kind_and_input().0
+    }
+
+    fn kind_and_input(&self) -> (ErrorKind, Option<Input>) {
+        use ErrorKind as K;
         use SessionError as E;
+        let (campaign, recording, data) =
+            (Some(Input::Campaign), Some(Input::Recording), Some(Input::RecordedData));
         match self {
-            E::Campaign(CampaignError::Read { .. })
-            | E::Nightly(NightlyError::Read { .. })
+            E::Campaign(CampaignError::Read { .. }) | E::Sequence(_) | E::Rehearsal(_) => {
+                (K::Failure, campaign)
+            }
+            // Only these errors come from the file system; all others come from the recording itself.
+            E::Record(RecordError::Read { .. } | RecordError::Exists { .. } | RecordError::Create { .. })
+            | E::Record(RecordError::Write { .. } | RecordError::BadInput { .. })
+            | E::Record(RecordError::Log(LogError::Read { .. }))
+            | E::Log(LogError::Read { .. })
+            | E::ChannelMap(ChannelMapError::Read { .. }) => (K::Failure, recording),
+            E::Nightly(NightlyError::Read { .. })
             | E::MapWork(MapWorkError::Description(DescriptionError::Read(..)))
-            | E::ChannelMap(ChannelMapError::Read { .. }) => ErrorKind::Failure,
+            | E::Calibration(_)
+            | E::History(_)
+            | E::File { .. }
+            | E::Exists(_)
+            | E::TooManyRuns(..)
+            | E::Yaml(_)
+            | E::Json(_) => (K::Failure, None),
             E::Campaign(CampaignError::Mistakes(_))
-            | E::Nightly(NightlyError::Mistakes(_))
-            | E::NightlySequence(..)
-            | E::DuplicateNightlyRun(..)
-            | E::NightlyMismatch(..)
-            | E::NoRecording
-            | E::DifferentCampaigns { .. }
-            | E::DifferentChannelMaps
-            | E::NoEffects
-            | E::Method(..)
             | E::Model(_)
             | E::Backend(_)
             | E::Reader { .. }
+            | E::FirstMap(_)
+            | E::Script(_) => (K::BadInput, campaign),
+            E::NoRecording
+            | E::ChannelMap(ChannelMapError::Mistakes(_))
+            | E::SameRecording(_)
+            | E::LogOption(_)
+            | E::Record(RecordError::ChannelMap(_) | RecordError::LogWithoutMap { .. }) => {
+                (K::BadInput, recording)
+            }
+            E::DifferentCampaigns { .. }
+            | E::Method(..)
+            | E::MachineUnknown { .. }
+            | E::Drift(DriftError::NoRun) => (K::BadInput, data),
+            E::MissingGuards { .. } | E::GuardWithoutChannel { .. } => (K::Rig, campaign),
+            E::RigInUse { .. }
+            | E::RigAbandoned { .. }
+            | E::RigLockedOut { .. }
+            | E::RigFileDoubtful { .. }
+            | E::NotArmed(_)
+            | E::Preflight(_) => (K::Rig, None),
+            E::Plan(_) | E::RehearsalTripped { .. } | E::NoSteps(..) => (K::NoPlan, campaign),
+            E::NotAPlan(..)
+            | E::StalePlan { .. }
+            | E::InvalidPlan { .. }
+            | E::NotResumable { .. }
+            | E::LostSteps { .. } => (K::NoPlan, None),
+            E::Run { source, .. } => match source {
+                RunError::Backend(_) | RunError::NotArmed(_) | RunError::NotSafe { .. } => (K::Rig, None),
+                RunError::Source(_) => (K::BadInput, None),
+                RunError::Observer(_) | RunError::Panicked { .. } => (K::Failure, None),
+            },
+            E::Log(_) | E::Record(_) => (K::BadRecording, recording),
+            E::NoPoints(..) | E::NoMap(..) | E::Driven(_) | E::OtherMachine(_) => (K::BadRecording, data),
+            E::Identify(_) | E::Drift(_) | E::Gap(_) => (K::BadRecording, data),
+            E::CalibratedModel(CalibratedModelError::Gap(_)) => (K::BadRecording, None),
+            E::Export(ExportError::NeedsFit { .. }) => (K::BadInput, None),
+            E::Export(_) => (K::Failure, None),
+            E::Nightly(NightlyError::Mistakes(_))
+            | E::NightlySequence(..)
+            | E::DuplicateNightlyRun(..)
+            | E::NightlyMismatch(..)
+            | E::DifferentChannelMaps
+            | E::NoEffects
             | E::Effect(_)
             | E::DuplicateEffect { .. }
             | E::EffectFilesUnsupported(..)
-            | E::ChannelMap(ChannelMapError::Mistakes(_))
-            | E::MachineUnknown { .. }
             | E::NothingToAcknowledge { .. }
             | E::Import(..)
             | E::MapWork(_)
@@ -343,61 +353,11 @@ impl SessionError {
             | E::UnknownSampleFormat { .. }
             | E::Fit(..)
             | E::Fmu(_)
-            | E::FirstMap(_)
-            | E::Drift(DriftError::NoRun)
-            | E::Export(ExportError::NeedsFit { .. })
-            | E::Script(_)
-            | E::SameRecording(_)
-            | E::SeveralRecordings(_) => ErrorKind::BadInput,
-            E::MissingGuards { .. }
-            | E::GuardWithoutChannel { .. }
-            | E::RigInUse { .. }
-            | E::RigAbandoned { .. }
-            | E::RigLockedOut { .. }
-            | E::RigFileDoubtful { .. }
-            | E::NotArmed(_)
-            | E::Preflight(_) => ErrorKind::Rig,
-            E::Plan(_)
-            | E::NotAPlan(..)
-            | E::StalePlan { .. }
-            | E::InvalidPlan { .. }
-            | E::NotResumable { .. }
-            | E::LostSteps { .. }
-            | E::RehearsalTripped { .. }
-            | E::NoSteps(..) => ErrorKind::NoPlan,
-            E::Run { source, .. } => match source {
-                RunError::Backend(_) | RunError::NotArmed(_) => ErrorKind::Rig,
-                RunError::Source(_) => ErrorKind::BadInput,
-                RunError::Observer(_) | RunError::Panicked { .. } => ErrorKind::Failure,
-                RunError::NotSafe { .. } => ErrorKind::Rig,
-            },
-            // Only these errors come from the file system; all others come from the recording itself.
-            E::Record(RecordError::Read { .. } | RecordError::Exists { .. } | RecordError::Create { .. })
-            | E::Record(RecordError::Write { .. } | RecordError::BadInput { .. }) => ErrorKind::Failure,
-            E::Record(RecordError::ChannelMap(_) | RecordError::LogWithoutMap { .. }) => ErrorKind::BadInput,
-            E::Record(RecordError::Log(LogError::Read { .. })) | E::Log(LogError::Read { .. }) => {
-                ErrorKind::Failure
-            }
-            E::Log(_) | E::NoPoints(..) | E::NoMap(..) => ErrorKind::BadRecording,
-            E::CalibratedModel(CalibratedModelError::Gap(_)) => ErrorKind::BadRecording,
-            E::LogOption(_)
+            | E::SeveralRecordings(_)
             | E::CalibratedModel(_)
             | E::CalibratedModelFile { .. }
-            | E::StoredDiagnosis { .. } => ErrorKind::BadInput,
-            E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
-                ErrorKind::BadRecording
-            }
-            E::Sequence(_)
-            | E::Rehearsal(_)
-            | E::Calibration(_)
-            | E::History(_)
-            | E::Export(_)
-            | E::File { .. }
-            | E::Exists(_)
-            | E::TooManyRuns(..)
-            | E::Yaml(_)
-            | E::Json(_) => ErrorKind::Failure,
-            E::Interrupted => ErrorKind::Interrupted,
+            | E::StoredDiagnosis { .. } => (K::BadInput, None),
+            E::Interrupted => (K::Interrupted, None),
         }
     }
 }

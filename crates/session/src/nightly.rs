@@ -1,5 +1,4 @@
-//! A night of runs: its pieces, its rows in the history, their comparison with earlier nights, and the report, stored next to the history so that
-//! its picture can link to it.
+//! A night of runs: its pieces, its rows in the history, comparison with earlier nights, and the report, stored next to the history.
 
 use crate::plan::planning::{nominal_model, plan};
 use crate::recording::files::{PROGRAM, json_text};
@@ -106,9 +105,6 @@ impl PreparedNight {
     }
 
     /// Checks that rows made elsewhere match the runs of this night.
-    ///
-    /// # Errors
-    /// [`SessionError::NightlyMismatch`] if a run is missing or belongs to another night.
     pub fn check_rows(&self, rows: Vec<RunRow>) -> Result<Vec<RunRow>, SessionError> {
         let expected_keys = self.runs.iter().map(|run| &run.key);
         if expected_keys.eq(rows.iter().map(|row| &row.key)) {
@@ -121,17 +117,12 @@ impl PreparedNight {
     }
 }
 
-/// Parses a method name as written in campaigns.
 fn method(name: &str) -> Result<Method, SessionError> {
     serde_json::from_value(name.into()).map_err(|source| SessionError::Method(name.to_owned(), source))
 }
 
 impl Session<'_> {
-    /// Runs all campaigns on `jobs` threads (default: all cores). Rows come in the order of the nightly campaign for any number of threads.
-    ///
-    /// # Errors
-    /// [`SessionError::Interrupted`] if the operator stopped it, [`SessionError::File`] if the recordings cannot be stored. A failed run becomes
-    /// a row with its reason.
+    /// Runs all campaigns on `jobs` threads (default: all cores), rows in the order of the file. A failed run becomes a row with its reason.
     pub fn run_night(&self, night: &PreparedNight, jobs: Option<usize>) -> Result<Vec<RunRow>, SessionError> {
         let runs = &night.runs;
         // A backend that cannot draw machines is reported before any run.
@@ -235,8 +226,7 @@ impl NightlyRun {
         Ok(())
     }
 
-    /// Identifies one recording by each of the methods and returns the points with their truth, as in a run's `points.json`. The inner `Err` is
-    /// the reason if a guard stopped the run.
+    /// Identifies one recording by each method; returns the points with their truth. The inner `Err`: why a guard stopped the run.
     pub fn points(
         &self,
         session: &Session<'_>,
@@ -404,7 +394,6 @@ pub fn night_report_link(picture: &Path, history: &Path, started_ms: i64) -> Opt
     }
 }
 
-/// A path with URL escapes.
 fn escaped(path: &Path) -> String {
     let mut text = String::new();
     for byte in path.to_string_lossy().bytes() {

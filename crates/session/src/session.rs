@@ -52,7 +52,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Sends an event to the observer.
     pub(crate) fn send(&self, event: SessionEvent) {
         (self.on_event)(&event);
     }
@@ -146,8 +145,7 @@ pub struct Registry {
 }
 
 impl Registry {
-    /// A registry without plug-ins, to which its user adds those that are needed. It runs no campaign without a backend, and diagnoses nothing
-    /// without an effect library.
+    /// A registry without plug-ins, for its user to fill: without a backend it runs no campaign, without an effect library it diagnoses nothing.
     pub fn empty() -> Self {
         Registry {
             backends: Vec::new(),
@@ -162,9 +160,6 @@ impl Registry {
     }
 
     /// The backend that a campaign names: a plug-in, or a driver of that name.
-    ///
-    /// # Errors
-    /// [`SessionError::Backend`] if the name is unknown or the settings are wrong.
     pub fn make_backend(&self, campaign: &Campaign, model: &Model) -> Result<Box<dyn Backend>, SessionError> {
         self.make_named_backend(&campaign.backend, campaign, model).map_err(SessionError::Backend)
     }
@@ -176,7 +171,6 @@ impl Registry {
         BackendPlugin::make_by_name(&self.backends, name, &nominal, settings).ok()?.describe().accepts
     }
 
-    /// Creates one backend by name.
     pub(crate) fn make_named_backend(
         &self,
         wanted: &BackendChoice,
@@ -193,9 +187,6 @@ impl Registry {
     }
 
     /// The effect library with effects defined by scripts.
-    ///
-    /// # Errors
-    /// A script that cannot be read, is not an effect, or reuses the name of another.
     pub fn effects_with(&self, scripts: &[PathBuf]) -> Result<Vec<Arc<dyn Effect>>, SessionError> {
         let mut effects = self.effects.clone();
         for path in scripts {
@@ -215,7 +206,6 @@ fn no_effect(path: &Path) -> Result<Arc<dyn Effect>, Box<dyn std::error::Error +
     Err(Box::new(SessionError::EffectFilesUnsupported(path.to_owned())))
 }
 
-/// Nominal machine and rig data for a backend.
 fn nominal_rig(campaign: &Campaign, model: &Model, registry: &Registry) -> NominalRig {
     let sensors = || campaign.sensors.iter();
     // The errors that identification assumes are drawn too.

@@ -93,8 +93,7 @@ impl Backend {
         let registry = registry();
         let named = campaign.backend.name.clone();
         if named != name {
-            // Built-in backends need no settings. A driver needs at least an address, and the settings of another backend do not contain
-            // it.
+            // Built-in backends need no settings; a driver needs an address, which the settings of another backend do not contain.
             if !registry.backends.iter().any(|plugin| plugin.name == name) {
                 let is_known = INCLUDED_DRIVERS.iter().any(|(known, ..)| *known == name);
                 let message = match is_known || mapper::driver_locations().find(name).is_some() {

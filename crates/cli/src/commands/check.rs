@@ -71,7 +71,7 @@ impl Check {
             }));
         }
         if warnings.count() > 0 {
-            standard_output::warn(&warnings.render(output_options::is_stderr_coloured()));
+            standard_output::say(&warnings.render(output_options::is_stderr_coloured()));
         }
         standard_output::show(
             &CheckedCampaign {

@@ -3,8 +3,7 @@
 use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::{Code, Failure};
-use crate::output::standard_output;
-use crate::output::standard_output::FileOutput;
+use crate::output::standard_output::{self, FileOutput};
 use clap::Args;
 use mapper_report::{Describe, corrected_csv};
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, Session, SessionError, Versioned};

@@ -56,11 +56,7 @@ impl Estimate {
         let tried = with_fleet(&self.directory, None, |fleet, kind, engine, machine| {
             fleet.estimate_cost(kind, self.tries.into(), engine, machine)
         })?;
-        if self.json {
-            standard_output::print_json(&tried.cost)
-        } else {
-            standard_output::show(&tried.cost.document())
-        }
+        standard_output::show_result(&tried.cost, self.json)
     }
 }
 
@@ -162,11 +158,7 @@ pub struct Retry {
 impl Retry {
     pub fn run(&self) -> Result<(), Failure> {
         let submission = with_fleet(&self.directory, None, |fleet, _, _, machine| fleet.retry(machine))?;
-        if self.json {
-            standard_output::print_json(&submission)
-        } else {
-            standard_output::show(&submission.document())
-        }
+        standard_output::show_result(&submission, self.json)
     }
 }
 
@@ -301,11 +293,7 @@ impl Submit {
             let cost = fleet.estimate_cost(kind, TRIAL_ITEMS, engine, machine)?.cost;
             fleet.submit(&options, &cost, machine)
         })?;
-        if self.json {
-            standard_output::print_json(&submission)
-        } else {
-            standard_output::show(&submission.document())
-        }
+        standard_output::show_result(&submission, self.json)
     }
 }
 

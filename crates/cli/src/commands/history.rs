@@ -1,8 +1,7 @@
 //! `mapper history`: results of the nightly runs.
 
 use crate::output::failure::Failure;
-use crate::output::standard_output;
-use crate::output::standard_output::FileOutput;
+use crate::output::standard_output::{self, FileOutput};
 use clap::Args;
 use mapper_history::{Filter, Metric};
 use mapper_report::{history_svg, listed_runs, night_groups};

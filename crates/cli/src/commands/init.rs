@@ -115,7 +115,7 @@ fn ask_wheel_diameter_m() -> Result<f64, Failure> {
     if !std::io::stdin().is_terminal() {
         return Err(missing("the diameter of the compressor wheel is required"));
     }
-    standard_output::warn("Diameter of the compressor's wheel at its exit, mm: ");
+    standard_output::say("Diameter of the compressor's wheel at its exit, mm: ");
     let mut line = String::new();
     // Limited, because a diameter has only a few characters.
     let read = std::io::stdin().lock().take(64).read_line(&mut line);

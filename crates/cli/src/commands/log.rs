@@ -3,8 +3,7 @@
 use crate::command_line::{key_and_value, subcommands};
 use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::output::standard_output;
-use crate::output::standard_output::FileOutput;
+use crate::output::standard_output::{self, FileOutput};
 use clap::Args;
 use mapper_recording::ChannelMap;
 use mapper_report::{Document, log_contents, with_messages};

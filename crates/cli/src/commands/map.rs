@@ -3,8 +3,7 @@
 use crate::command_line::{MapReading, RecordingReading, reference, subcommands};
 use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::output::standard_output;
-use crate::output::standard_output::{FileOutput, MapTarget};
+use crate::output::standard_output::{self, FileOutput, MapTarget};
 use clap::Args;
 use mapper_core::EfficiencyDefinition;
 use mapper_maps::MapFitOptions;

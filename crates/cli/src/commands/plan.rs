@@ -3,8 +3,7 @@
 use crate::environment::registry;
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
-use crate::output::standard_output;
-use crate::output::standard_output::FileOutput;
+use crate::output::standard_output::{self, FileOutput};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;

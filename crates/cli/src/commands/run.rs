@@ -125,8 +125,8 @@ impl Run {
         };
         if let Some(live) = &live {
             live.start(&live_run).map_err(Failure::of_live)?;
-            live.warning().iter().for_each(|warning| standard_output::warn(&format!("warning: {warning}\n")));
-            standard_output::warn(&format!("live page: {}\n", live.url()));
+            live.warning().iter().for_each(|warning| standard_output::say(&format!("warning: {warning}\n")));
+            standard_output::say(&format!("live page: {}\n", live.url()));
         }
         let outcome = match pace {
             Some(pace) => {

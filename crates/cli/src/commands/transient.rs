@@ -3,8 +3,7 @@
 use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::output::standard_output;
-use crate::output::standard_output::FileOutput;
+use crate::output::standard_output::{self, FileOutput};
 use clap::Args;
 use mapper_report::Describe;
 use mapper_session::{DIAGNOSIS_FORMAT, Recorded, Session, Side, Versioned, write_transient};

@@ -22,17 +22,13 @@ use terminal_size::terminal_size_of;
 pub struct Failure {
     code: Code,
     message: String,
-    /// The command for the remedy.
     command: Option<String>,
-    /// Mistakes of a file, for programs.
     findings: Option<Value>,
     presentation: Presentation,
 }
 
-/// Presentation of a failure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Presentation {
-    /// A sentence after "mapper: ".
     Sentence,
     /// The message has its own layout (a rendered list of mistakes).
     Rendered,
@@ -54,7 +50,6 @@ impl Failure {
         }
     }
 
-    /// A library error with the command for its remedy, if there is one.
     fn with_command(code: Code, error: &dyn std::fmt::Display, command: Option<String>) -> Self {
         let shown = command.as_ref().map(|command| format!(" ({command})")).unwrap_or_default();
         Failure { command, ..Failure::new(code, format!("{error}{shown}")) }
@@ -68,7 +63,6 @@ impl Failure {
         }
     }
 
-    /// All mistakes of a file that people write.
     fn of_findings(findings: &Findings) -> Self {
         let message = findings.render(output_options::is_stderr_coloured());
         Failure {
@@ -90,7 +84,6 @@ impl Failure {
         Failure::with_command(Code::Failure, &error, command)
     }
 
-    /// An error of a kind of study, reported as by the command of that kind.
     fn of_kind(error: Box<dyn std::error::Error + Send + Sync>) -> Self {
         let error = match error.downcast::<CampaignError>() {
             Ok(error) => return Failure::of_campaign(*error),

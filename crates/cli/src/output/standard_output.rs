@@ -2,10 +2,11 @@
 
 use crate::output::failure::{Code, Failure};
 use crate::output::output_options::paint;
-use crate::output::standard_error::{say, wrap_for_terminal};
+pub use crate::output::standard_error::say;
+use crate::output::standard_error::wrap_for_terminal;
 use clap::Args;
 use mapper_core::{terminal_json, terminal_text};
-use mapper_report::{Document, with_messages};
+use mapper_report::{Describe, Document, with_messages};
 use mapper_session::{Existing, Gap, MapOut, MapWork, SessionError, write_file};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
@@ -82,21 +83,21 @@ pub fn show(document: &Document) -> Result<(), Failure> {
     print(&document.terminal(paint()))
 }
 
-/// Writes warnings, already formatted, to standard error.
-pub fn warn(text: &str) {
-    say(text);
+/// Writes a result as one JSON object, or as its document.
+pub fn show_result(result: &(impl Serialize + Describe), as_json: bool) -> Result<(), Failure> {
+    if as_json { print_json(result) } else { show(&result.document()) }
 }
 
 /// States that the file beside a recording was not used, and why.
 pub fn warn_of_unused(gap: &Gap) {
     if let Some(error) = &gap.not_used {
-        warn(&format!("diagnosed again: {error}\n"));
+        say(&format!("diagnosed again: {error}\n"));
     }
 }
 
 /// Writes the result of an operation on map files, and its assumptions as warnings.
 pub fn print_map_work(work: &MapWork, as_json: bool) -> Result<(), Failure> {
-    work.warnings.iter().for_each(|warning| warn(&format!("{warning}\n")));
+    work.warnings.iter().for_each(|warning| say(&format!("{warning}\n")));
     if as_json { print_json(&work.json) } else { show(&work.document) }
 }
 

@@ -25,13 +25,9 @@ const SPINNER: &str = "{spinner} {wide_msg} {elapsed}";
 /// The consumer of the progress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProgressFormat {
-    /// A user at a terminal.
     Bar,
-    /// A file that is read later: one line per step.
     Lines,
-    /// A program: JSON lines.
     Json,
-    /// None.
     Quiet,
 }
 
@@ -49,7 +45,6 @@ impl ProgressFormat {
         }
     }
 
-    /// Whether an event is shown.
     fn shows(self, event: &SessionEvent) -> bool {
         use SessionEvent as E;
         match self {
@@ -80,8 +75,7 @@ const SEND_TIMEOUT: Duration = Duration::from_millis(10);
 /// Longest wait at the end for the queued events to be shown.
 const FLUSH_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Shows the events of a session. Many threads may send them; a separate thread shows them, so no sender waits for a terminal
-/// or a pipe. A terminal on hold (Ctrl-S) or a pipe without a reader loses lines; the run and its guards continue.
+/// Shows events on its own thread: no sender waits for a terminal or pipe. One that is held or unread loses lines; the run goes on.
 pub struct Progress {
     manner: ProgressFormat,
     to: SyncSender<Queued>,
@@ -90,7 +84,6 @@ pub struct Progress {
 
 enum Queued {
     Event(Box<SessionEvent>),
-    /// Removes the bar and acknowledges.
     Clear(SyncSender<()>),
 }
 
@@ -105,7 +98,6 @@ impl Progress {
         Progress { manner, to, stalled: AtomicBool::new(false) }
     }
 
-    /// Shows an event.
     pub fn show(&self, event: &SessionEvent) {
         if !self.manner.shows(event) {
             return;
@@ -169,11 +161,8 @@ fn show_all(manner: ProgressFormat, queued: &Receiver<Queued>) {
 
 #[derive(Default)]
 struct State {
-    /// Current style of the bar.
     template: Option<&'static str>,
-    /// Last line written to a pipe.
     last_line: String,
-    /// Start of the first piece of work.
     began: Option<Instant>,
     steps: usize,
     /// Number of the current step, from 1.
@@ -258,7 +247,6 @@ impl ProgressDisplay {
     }
 }
 
-/// Target of a step.
 fn place(marker: &StepMarker) -> String {
     marker.to.map_or_else(String::new, |point| point.in_words())
 }

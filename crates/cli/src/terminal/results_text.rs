@@ -46,8 +46,7 @@ pub fn results_text(units: &DisplayUnits, results: &Results, command: &str, show
     document
 }
 
-/// The results of an identification that wrote no files. `command`: the command that shows the rest, in words; `warnings`: problems of
-/// the recordings.
+/// The results of an identification without files. `command`: shows the rest, in words; `warnings`: of the recordings.
 pub fn identified_text(
     units: &DisplayUnits,
     identified: &Identified,

@@ -19,13 +19,10 @@ const JITTER_RATIO: f64 = 1e-9;
 /// Base hypothesis of the search: the null hypothesis, or a library cause that stays free during the search.
 #[derive(Debug)]
 pub(crate) struct Base<'a> {
-    /// The recording.
     pub(crate) study: &'a Study,
-    /// Linearisation at the base.
     pub(crate) linearised: &'a Linearised,
     /// Nuisances and effects of the base.
     pub(crate) hypothesis: Hypothesis,
-    /// Whitened residual of the base.
     pub(crate) residual: Vec<f64>,
     /// Whitened derivatives with respect to the base's effects.
     pub(crate) free: Vec<Vec<f64>>,
@@ -96,7 +93,6 @@ impl<'a> Base<'a> {
         of_terms
     }
 
-    /// A change of one sensor's readings alone.
     fn of_sensor(&self, channel: Channel, change: &[f64]) -> Vec<f64> {
         let mut own = vec![0.0; change.len()];
         for group in self.study.groups.iter().filter(|group| OUTPUTS[group.output] == channel) {
@@ -156,8 +152,7 @@ impl Products {
         Products { steps, nuisances, free: base.free.len() }
     }
 
-    /// Products of the columns (the residual last) over the selected steps. Nuisances and free columns are projected out, as far as their
-    /// priors allow.
+    /// Products of the columns (the residual last) over the selected steps, nuisances and free columns projected out as far as priors allow.
     pub(crate) fn projected(&self, counts: &[bool]) -> Option<DMatrix<f64>> {
         let size = self.steps.first()?.nrows();
         let (u, n) = (self.nuisances.len(), self.nuisances.len() + self.free);

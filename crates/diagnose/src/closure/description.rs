@@ -23,7 +23,6 @@ const TENTHS: f64 = 10.0;
 /// A number with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Uncertain {
-    /// Value.
     pub(crate) value: f64,
     /// Half of its 95 % interval.
     pub(crate) half: f64,
@@ -47,9 +46,7 @@ impl Uncertain {
 /// A closure term's numbers and its sentence.
 #[derive(Debug, Clone)]
 pub(crate) struct ClosureDescription {
-    /// The sentence.
     pub(crate) sentence: String,
-    /// Its numbers.
     pub(crate) terms: Vec<ClosureCoefficient>,
     /// Temperature of the heat exchange partner, K, if it is one of the numbers.
     pub(crate) sink_k: Option<f64>,
@@ -89,7 +86,7 @@ pub(crate) fn describe(
             / (values[slope] * values[slope]);
         let sink = Uncertain { value: REFERENCE_K + ratio, half: widened * variance.max(0.0).sqrt() };
         let in_celsius = Uncertain { value: sink.value - ICE_POINT_K, ..sink };
-        let from = terms[slope].words_of_place();
+        let from = terms[slope].balance().properties().place_words;
         let sentence = format!(
             "{} from {from} to something at {}",
             numbers[slope].words(terms[slope].unit),

@@ -17,10 +17,9 @@ use crate::gap::causes::place::{
 use crate::gap::causes::probabilities::{candidate, weight};
 use crate::gap::causes::select::MIN_GAP_REDUCTION;
 use crate::gap::gap_reduction::{FOLDS, channels_on};
-use crate::gap::library_fits::LibraryFits;
+use crate::gap::library_fits::{Explained, LibraryFits};
 use crate::gap::report::{BalanceClosure, Candidate, ClosureTerm, MAX_EQUIVALENT, Place};
 use crate::gap::residuals::study::{Study, members};
-use crate::gap::verdict::Explained;
 use mapper_core::half_width_95;
 use mapper_inference::posterior::{CauseProbabilities, CauseSet, Rules};
 
@@ -382,8 +381,7 @@ fn reported_source(source: ResidualSource) -> BalanceClosure {
     }
 }
 
-/// Gap reduction by a closure term on steps used neither to find nor to fit it:
-/// `1 - sum g_after+/sum g_before+` with `g = (|r|^2 - n)/n` over the held-out steps; over all steps if none is held out.
+/// Gap reduction by a closure term: `1 - sum g_after+/sum g_before+`, `g = (|r|^2 - n)/n`, over the held-out steps, or all if there are none.
 fn gap_reduction(study: &Study, before: &Fit, after: &Fit, held_out: &[usize]) -> f64 {
     let all: Vec<usize> = (0..study.steps.len()).collect();
     let steps = if held_out.is_empty() { &all } else { held_out };

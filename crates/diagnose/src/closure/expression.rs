@@ -4,24 +4,17 @@ use mapper_inference::hypotheses::{Shape, TimeHistory};
 use mapper_physics::machine::hooks::Site;
 use std::fmt::{Display, Formatter, Result};
 
-/// A formula of machine quantities.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Expression {
-    /// A number.
     Number(f64),
-    /// A quantity.
     Of(Quantity),
     /// The sensor's reading without the closure term; only within a reading.
     Value,
-    /// First minus second.
     Minus(Box<Expression>, Box<Expression>),
-    /// First times second.
     Times(Box<Expression>, Box<Expression>),
     /// A power; its base is positive.
     Power(Box<Expression>, f64),
-    /// The natural logarithm.
     Ln(Box<Expression>),
-    /// The spans in which it acts.
     InTime(Spans),
 }
 
@@ -68,12 +61,10 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
-/// `a - b`.
 pub(crate) fn minus(a: Expression, b: Expression) -> Expression {
     Minus(Box::new(a), Box::new(b))
 }
 
-/// `a - b`.
 pub(crate) fn difference(a: Quantity, b: Quantity) -> Expression {
     minus(Of(a), Of(b))
 }
@@ -88,12 +79,10 @@ pub(crate) fn below(number: f64, of: Expression) -> Expression {
     minus(Number(number), of)
 }
 
-/// `factor * of`.
 pub(crate) fn times(factor: f64, of: Expression) -> Expression {
     Times(Box::new(Number(factor)), Box::new(of))
 }
 
-/// `a * b`.
 pub(crate) fn product(a: Expression, b: Expression) -> Expression {
     Times(Box::new(a), Box::new(b))
 }
@@ -167,7 +156,6 @@ pub(crate) const DECAY: Shape = Shape::Decay(30.0);
 pub(crate) struct Span {
     /// History over time, s; an onset at minus infinity precedes the recording.
     pub(crate) history: TimeHistory,
-    /// Its end, s.
     pub(crate) end_s: f64,
 }
 

@@ -43,7 +43,6 @@ const GAIN_RATIO: f64 = 0.02;
 /// Powers of the speed, and the words that follow "growing with the". Source: friction of a film grows with the first, windage with the third.
 const GROWTHS: [(f64, &str); 3] = [(1.0, "speed"), (2.0, "square of the speed"), (3.0, "cube of the speed")];
 
-/// All terms.
 pub(crate) fn library() -> Vec<Term> {
     let mut all = Vec::new();
     add_housings(&mut all);

@@ -1,5 +1,4 @@
-//! Discovery outside the effect library: the residual source term in each balance, its location, and a closure term for it. See `docs/explanation/gap.md` for
-//! the method and its limits.
+//! Discovery outside the effect library: residual source terms of the balances, their location, a closure term. Method: `docs/explanation/gap.md`.
 
 pub(crate) mod columns;
 pub(crate) mod description;

@@ -30,10 +30,8 @@ const RUN: [Balance; 8] = [
     Balance::MapFlow,
 ];
 
-/// A balance with its residual source term.
 #[derive(Debug, Clone)]
 pub(crate) struct ResidualSource {
-    /// The balance.
     pub(crate) balance: Balance,
     /// Log evidence relative to none.
     pub(crate) gain: f64,

@@ -112,8 +112,7 @@ fn go_together(a: &Term, b: &Term) -> bool {
 /// Maximum number of terms tried with an onset. Bound: effort; each costs a run for each step.
 const TRIED: usize = 12;
 
-/// The best choices, each with the onset step that fits the recording best, best first; adds their terms to the library. `choices` must
-/// come from the same products and steps, best first.
+/// The best choices, best first, each with its best onset; adds their terms to the library. `choices`: of the same products, best first.
 pub(crate) fn begun(
     base: &Base<'_>,
     library: &mut Vec<Term>,
@@ -212,7 +211,6 @@ pub(crate) fn begun(
     Some((chosen, stability))
 }
 
-/// A term with an onset.
 fn from(term: &Term, begin_s: f64, step: usize) -> Term {
     let mut later = term.clone();
     for (_, formula) in &mut later.acts_on {
@@ -224,8 +222,7 @@ fn from(term: &Term, begin_s: f64, step: usize) -> Term {
     later
 }
 
-/// Whitened changes for one step of a term's coefficient, for an onset at each step of the recording: a term with an onset is the sum of its
-/// parts in each later step.
+/// Whitened changes for one step of a term's coefficient, for an onset at each step: the sum of the term's parts in the later steps.
 fn from_each_step(base: &Base<'_>, term: &Term) -> Vec<Vec<f64>> {
     let during = |spans: Spans| {
         let mut during = term.clone();
@@ -259,7 +256,6 @@ pub(crate) struct FittedClosure {
 type TermStart = (Choice, usize, Start);
 
 impl FittedClosure {
-    /// A start from the current values.
     pub(crate) fn restart(&self) -> TermStart {
         (self.choice.clone(), self.effect, Start::from(&self.fit))
     }
@@ -269,7 +265,6 @@ impl FittedClosure {
         self.fit.score - self.choice.rarity
     }
 
-    /// Its terms.
     pub(crate) fn terms<'a>(&self, library: &'a [Term]) -> Vec<&'a Term> {
         self.choice.terms.iter().map(|place| &library[*place]).collect()
     }

@@ -14,22 +14,18 @@ use std::borrow::Cow;
 /// Role of a term among others of its balance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Role {
-    /// A constant.
     Level,
     /// Proportional to a temperature relative to the library reference; together with the level, heat exchange with an unknown temperature.
     Slope,
     /// Heat exchange with a known temperature.
     Exchange,
-    /// Any other term.
     Other,
 }
 
-/// A term of the library.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Term {
     /// Balances it acts on, with the formulas that its coefficient multiplies; the first is its location. Heat between two parts acts on both.
     pub(crate) acts_on: Vec<(Balance, Expression)>,
-    /// Unit of the coefficient.
     pub(crate) unit: &'static str,
     /// A clearly significant size of the coefficient.
     pub(crate) step: f64,
@@ -42,7 +38,6 @@ pub(crate) struct Term {
 }
 
 impl Term {
-    /// Its location.
     pub(crate) fn balance(&self) -> Balance {
         self.acts_on[0].0
     }
@@ -65,11 +60,6 @@ impl Term {
         self.acts_on.iter().any(|(balance, _)| matches!(balance, Balance::Lag(_)))
     }
 
-    /// Name of what it acts on, for sentences.
-    pub(crate) fn words_of_place(&self) -> String {
-        self.balance().properties().place_words
-    }
-
     /// The machine part in which it acts.
     pub(crate) fn submodel(&self) -> Submodel {
         self.balance().properties().submodel
@@ -85,10 +75,6 @@ pub(crate) struct TermHooks {
     on_readings: bool,
 }
 
-/// Adds terms with coefficients to a rig.
-///
-/// # Errors
-/// Never in practice: terms have no hidden temperatures.
 pub(crate) fn put_into(rig: &mut Rig, terms: &[(Term, f64)]) -> Result<(), TooManyExtraStates> {
     let mut acting = Vec::new();
     for (term, coefficient) in terms {
@@ -113,7 +99,6 @@ impl TermHooks {
         here.map(|(_, coefficient, formula)| coefficient * formula.of(site, value)).sum()
     }
 
-    /// Gas temperature after heat from a balance.
     fn heated_k(&self, at: Balance, site: &Site<'_>, gas_k: f64) -> f64 {
         let heat_w = self.sum(at, site, gas_k);
         if heat_w == 0.0 {
@@ -181,7 +166,6 @@ pub(crate) struct ClosureEffect {
 }
 
 impl ClosureEffect {
-    /// The effect of one or more terms.
     pub(crate) fn new(terms: Vec<Term>) -> ClosureEffect {
         let parameters = terms
             .iter()
@@ -268,11 +252,9 @@ pub(crate) enum Balance {
     Lag(Channel),
 }
 
-/// Properties of a balance.
 pub(crate) struct Properties {
     /// Part of the machine to which it belongs.
     pub(crate) submodel: Submodel,
-    /// Unit of the source term.
     pub(crate) unit: &'static str,
     /// A clearly significant size of the source term, for a machine of some kilowatts.
     pub(crate) plain_size: f64,
@@ -285,7 +267,6 @@ pub(crate) struct Properties {
 }
 
 impl Balance {
-    /// Its properties.
     pub(crate) fn properties(self) -> Properties {
         let term = |submodel, unit, plain_size, words: &str, hook_name: &str| Properties {
             submodel,

@@ -165,7 +165,6 @@ impl LowRank {
         values
     }
 
-    /// Inverse covariance (whitened) times whitened columns.
     pub(crate) fn inverse_times(&self, whitened: &DMatrix<f64>) -> DMatrix<f64> {
         whitened - &self.columns * self.constants(whitened)
     }

@@ -27,7 +27,6 @@ pub enum Cause {
 pub enum CauseKind {
     /// Only the reading changes, not the measured quantity.
     Sensor,
-    /// The machine changes.
     Machine,
 }
 

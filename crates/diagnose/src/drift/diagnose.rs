@@ -25,10 +25,6 @@ use nalgebra::DMatrix;
 const MODEL_ERROR_RATIO: f64 = 0.15;
 
 /// Finds the causes of drift.
-///
-/// # Errors
-/// [`DriftError`] if a recording has no steps or too few channels, or the model cannot follow it. A valid recording without enough information
-/// (no repeats, a gap, another machine) gives a report with the verdict `unclear` and its reason.
 pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
     if request.runs.is_empty() {
         return Err(DriftError::NoRun);

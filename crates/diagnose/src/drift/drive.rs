@@ -44,7 +44,6 @@ pub(crate) struct Prediction {
 }
 
 impl Prediction {
-    /// Appends the prediction of the next run.
     fn append(&mut self, next: Prediction) {
         self.means.extend(next.means);
         self.surge_position_ratio.extend(next.surge_position_ratio);
@@ -278,7 +277,6 @@ impl Inputs for DriftFreeInputs<'_> {
 /// readings, the metal from the change of its readings.
 pub(crate) const SKIPPED_S: f64 = SEGMENTS.first_s;
 
-/// One step of a run.
 pub(crate) struct DrivenStep {
     pub step: CampaignStep,
     pub start_s: f64,
@@ -289,7 +287,6 @@ pub(crate) struct DrivenStep {
     pub before_jump: Option<State>,
     /// Measured state [`SKIPPED_S`] after the jump.
     pub after_jump: Option<State>,
-    /// Measured state at the end.
     pub at_end: Option<State>,
     /// The part that the model can follow.
     pub coverage: Coverage,
@@ -345,8 +342,7 @@ pub(crate) fn measured_state(
     complete.then(|| estimate_state(boundary, read))
 }
 
-/// The state after a skipped part: as `measured` there, but with the metal of `state` plus the measured change since `before`, so that offsets of
-/// the metal sensors cancel.
+/// The state after a skipped part: `measured`, with the metal of `state` plus its measured change since `before`: sensor offsets cancel.
 pub(crate) fn state_after(state: State, before: Option<State>, measured: State) -> State {
     let before = before.unwrap_or(State { tc_k: state.tc_k, tt_k: state.tt_k, ..measured });
     let tc_k = state.tc_k + measured.tc_k - before.tc_k;

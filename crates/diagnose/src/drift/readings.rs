@@ -11,8 +11,7 @@ use mapper_observe::perturbation::Perturbation;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
-/// Change of readings and points: the compared means, segment by segment, then the efficiency (fraction) at the end of each step, then the
-/// heat-transfer coefficient there, W/(m2 K).
+/// Changes of the compared means, by segment, then, at the end of each step, of the efficiency (fraction), then of h, W/(m2 K).
 pub(crate) type Response = DVector<f64>;
 
 /// Means of [`OUTPUTS`] over a segment, measured and by the nominal model.
@@ -23,7 +22,6 @@ pub(crate) struct SegmentMeans {
     pub nominal: [f64; OUTPUTS.len()],
 }
 
-/// All readings compared with the model.
 #[derive(Clone)]
 pub(crate) struct Readings {
     pub runs: usize,
@@ -125,7 +123,6 @@ impl Readings {
         })
     }
 
-    /// Mean of a time history over the segment of a row.
     pub(super) fn mean_of(&self, row: usize, history: TimeHistory) -> f64 {
         let segment = &self.segments[row / self.columns.len()];
         let offset_s = self.steps[segment.step].offset_s;
@@ -155,7 +152,6 @@ impl Readings {
         is_complete.then(|| Readings { difference, model, responses, ..self.clone() })
     }
 
-    /// Readings and points of a prediction.
     fn response_to(&self, prediction: &Prediction) -> Response {
         let (rows, columns, steps) = (self.row_count(), self.columns.len(), self.steps.len());
         Response::from_fn(rows + 2 * steps, |position, _| match position.checked_sub(rows) {
@@ -273,8 +269,7 @@ const TURBINE_VARIATION: [(Channel, f64); 2] = [(Channel::Tt, 0.2), (Channel::T4
 /// Maximum number of intervals between knots. Bound: effort; eight hours.
 const MAX_INTERVALS: f64 = 60.0;
 
-/// Adds time histories that are linear between knots: of the air around the housings, within its tolerance, and of the turbine side. No drift
-/// has such a time history, so they do not hide one.
+/// Adds time histories, linear between knots, of the air around the housings and of the turbine side. No drift has one, so none is hidden.
 fn add_slow_variations(readings: &Readings, declared: &Declared, constants: &mut Vec<Response>) {
     let ambient_k = Perturbation::Ambient.tolerance(&declared.tolerances);
     let (start_s, end_s) = readings.span_s();

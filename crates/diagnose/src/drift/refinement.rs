@@ -112,7 +112,6 @@ fn with_date_errors(columns: &DMatrix<f64>, readings: &Readings, known: &[Fitted
     all
 }
 
-/// The best fit of a drift.
 #[derive(Debug, Clone)]
 pub(crate) struct FittedDrift {
     pub drift: Drift,
@@ -124,7 +123,6 @@ pub(crate) struct FittedDrift {
     pub onset_high_s: f64,
 }
 
-/// The fits of all drifts, with the constants.
 pub(crate) struct FittedDrifts {
     pub drifts: Vec<FittedDrift>,
     /// Most probable constants, in standard deviations.
@@ -133,8 +131,7 @@ pub(crate) struct FittedDrifts {
     pub noise: LowRank,
 }
 
-/// FittedDrifts all causes jointly, each with the kind of its time history, starting at its onset. `constants` are the responses to the constants, a column
-/// each.
+/// Fits all causes jointly, each with its kind of time history from its onset. `constants`: responses to the constants, a column each.
 pub(crate) fn fit(
     readings: &Readings,
     own: &[DMatrix<f64>],
@@ -230,7 +227,6 @@ fn fit_one(
     })
 }
 
-/// A detected cause, before the fit of its size and onset.
 #[derive(Debug, Clone)]
 pub(crate) struct DetectedCause {
     pub cause: Cause,
@@ -253,8 +249,7 @@ pub(crate) struct Decision {
     pub own: Vec<DMatrix<f64>>,
 }
 
-/// `own` is the declared covariance of each segment, `constants` the responses to the constants, a column each. Onsets near `known` drifts are
-/// tried on a finer grid.
+/// `own`: declared covariance of each segment; `constants`: responses to the constants, a column each. Onsets are finer near `known` drifts.
 pub(crate) fn decide(
     readings: &Readings,
     mut own: Vec<DMatrix<f64>>,
@@ -318,8 +313,7 @@ fn probabilities(ln_odds: Vec<(Option<Cause>, f64)>) -> Vec<Alternative> {
     all
 }
 
-/// Excludes segments that are outliers even for the best explanation: the model cannot follow the machine there (surge, a valve at its stop).
-/// Returns their number, the noise without them, and the residual of the best explanation.
+/// Excludes outliers even for the best explanation (surge, a valve at its stop); returns their number, the remaining noise and residual.
 pub(crate) fn leave_out(
     own: &mut [DMatrix<f64>],
     readings: &Readings,

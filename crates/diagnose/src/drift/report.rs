@@ -45,15 +45,12 @@ pub struct Alternative {
 /// The smallest detectable drift.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DetectionLimit {
-    /// The cause.
     pub cause: Cause,
     /// Expected steady drift over the whole campaign that is as probable as none, unit of the cause.
     pub change: f64,
-    /// Unit.
     pub unit: &'static str,
 }
 
-/// A channel at one visit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct VisitChannel {
     /// Mean reading over the end of the step, SI.
@@ -156,7 +153,6 @@ pub struct FoundDrift {
 }
 
 impl FoundDrift {
-    /// Whether it is more probable than all its alternatives together.
     pub(crate) fn is_clear(&self) -> bool {
         self.probability >= 0.5
     }

@@ -161,7 +161,6 @@ pub struct DriftRequest<'a> {
 }
 
 impl DriftRequest<'_> {
-    /// The declarations of rig and machine.
     pub(crate) fn declared(&self) -> Declared {
         Declared {
             sensors: self.identification.declared.clone(),
@@ -236,7 +235,6 @@ pub(crate) const SEGMENTS: Schedule = Schedule {
     shortest_ratio: 0.0,
 };
 
-/// A step of one of the runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CampaignStep {
     pub run: usize,
@@ -255,7 +253,6 @@ pub(crate) struct CampaignStep {
     pub p3_pa: f64,
 }
 
-/// A segment of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Segment {
     /// Position of its step among all steps.
@@ -271,7 +268,6 @@ impl Segment {
     }
 }
 
-/// Steps of all runs, each with its operating point.
 pub(crate) fn steps(runs: &[&Recording]) -> Vec<CampaignStep> {
     let mut conditions: Vec<StepPoint> = Vec::new();
     let mut steps: Vec<CampaignStep> = Vec::new();

@@ -43,10 +43,6 @@ pub struct SideRequest<'a> {
 }
 
 /// Diagnoses a side.
-///
-/// # Errors
-/// [`DrivenError::Channel`] if a required channel is missing, [`DrivenError::TooFewRows`] if there are too few rows to fit,
-/// [`DrivenError::NoAnswer`] if the nominal machine has no solution under the driving channels.
 pub fn diagnose(request: &SideRequest<'_>, side: Side) -> Result<Diagnosis, DrivenError> {
     let effects = request.effects.iter().filter(|effect| !is_only_on_stands(&effect.info().id)).cloned();
     let effects: Vec<_> = effects.chain(log_effects(side == Side::Compressor)).collect();

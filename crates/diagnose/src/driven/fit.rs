@@ -23,7 +23,6 @@ use std::sync::Arc;
 /// One column per judged channel.
 pub(crate) type Columns = Vec<Vec<f64>>;
 
-/// The data that every hypothesis is compared with.
 pub(crate) struct SideProblem<'a, S> {
     pub(crate) side: &'a S,
     pub(crate) nominal: &'a Rig,
@@ -32,7 +31,6 @@ pub(crate) struct SideProblem<'a, S> {
     pub(crate) white_k: Vec<f64>,
 }
 
-/// The best fit of a hypothesis.
 #[derive(Debug, Clone)]
 pub(crate) struct SideFit {
     /// Unknowns in standard normal numbers, effects in their units.
@@ -66,7 +64,6 @@ const MIN_CURVATURE: f64 = 0.1;
 type ErrorPrior = (f64, f64);
 
 impl<S: SideModel> SideProblem<'_, S> {
-    /// The hypothesis without a cause.
     pub(crate) fn nothing(&self) -> Hypothesis {
         Hypothesis { nuisances: vec![0.0; S::UNKNOWNS.len()], effects: Vec::new() }
     }
@@ -106,7 +103,6 @@ impl<S: SideModel> SideProblem<'_, S> {
         judged.iter().zip(predicted).map(of_channel).collect()
     }
 
-    /// Whitening of each channel with these model errors, K.
     pub(crate) fn whitenings(&self, counts: &[bool], model_error_sigma_k: &[f64]) -> Vec<WhiteningFilter> {
         model_error_sigma_k
             .iter()
@@ -202,7 +198,6 @@ impl<S: SideModel> SideProblem<'_, S> {
         })
     }
 
-    /// The linearisation at a fit.
     pub(crate) fn linearise(&self, fit: &SideFit, counts: &[bool]) -> Option<LinearisedFit<'_, '_, S>> {
         let coordinates = coordinates(self.effects, &fit.hypothesis);
         let slopes = self.slopes(&fit.hypothesis, &fit.predicted, &coordinates, FINE);
@@ -211,7 +206,6 @@ impl<S: SideModel> SideProblem<'_, S> {
         self.linearised(hypothesis, predicted, &slopes, whitenings, fit.precision.clone())
     }
 
-    /// The linearisation without a cause at the unknowns of a fit.
     pub(crate) fn linearise_without_cause(
         &self,
         fit: &SideFit,
@@ -264,7 +258,6 @@ impl<S: SideModel> SideProblem<'_, S> {
     }
 }
 
-/// Change of predictions for one of `units`.
 fn changes(there: &Columns, here: &Columns, units: f64) -> Columns {
     let of_column = |(there, here): (&Vec<f64>, &Vec<f64>)| {
         there.iter().zip(here).map(|(there, here)| (there - here) / units).collect()
@@ -272,7 +265,6 @@ fn changes(there: &Columns, here: &Columns, units: f64) -> Columns {
     there.iter().zip(here).map(of_column).collect()
 }
 
-/// Columns of all channels, whitened.
 fn whitened(whitenings: &[WhiteningFilter], columns: &Columns) -> Columns {
     let mut white = columns.clone();
     whitenings.iter().zip(&mut white).for_each(|(whitening, column)| whitening.apply(column));
@@ -283,7 +275,6 @@ fn dot(a: &Columns, b: &Columns) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a * b).sum()
 }
 
-/// A fit with the whitened slopes of its free parameters.
 pub(crate) struct LinearisedFit<'a, 'p, S> {
     problem: &'a SideProblem<'p, S>,
     pub(crate) hypothesis: Hypothesis,
@@ -314,8 +305,7 @@ impl<S: SideModel> LinearisedFit<'_, '_, S> {
         Some(Change { change, own, imitated: solved.component_mul(&right).as_slice().to_vec() })
     }
 
-    /// Cost reduction by a change of any size, with all other parameters free. A fit has no slope along its free parameters, so the residual needs no
-    /// projection.
+    /// Cost reduction by a change of any size, all other parameters free: a fit has no slope along them, so the residual needs no projection.
     pub(crate) fn gain(&self, there: &Hypothesis) -> Option<f64> {
         let Change { change, own, .. } = self.change(there)?;
         let seen = dot(&change, &self.residual);
@@ -323,7 +313,6 @@ impl<S: SideModel> LinearisedFit<'_, '_, S> {
     }
 }
 
-/// Prior of the model error for a cause in the library.
 fn prior_inside(error: &ModelError) -> ErrorPrior {
     (error.median_k, error.width)
 }
@@ -346,7 +335,6 @@ struct Point {
 }
 
 impl<S: SideModel> Objective<'_, '_, S> {
-    /// Distance of each unknown from its prior mean, and the prior precision.
     fn prior_deviations(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)> {
         let count = unknowns.len() - self.priors.len();
         let of_effects = unknowns.iter().skip(count).zip(&self.priors);

@@ -19,7 +19,6 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use std::ops::Range;
 
-/// Root mean square of the first judged channel minus its prediction, K.
 pub(crate) fn residual_rms_k<S: SideModel>(
     problem: &SideProblem<'_, S>,
     predicted: &Columns,
@@ -89,7 +88,6 @@ pub(crate) fn held_out<S: SideModel>(
     })
 }
 
-/// Compares the rows after the fitted part with the prediction of `after`.
 pub(crate) fn beyond<S: SideModel>(
     problem: &SideProblem<'_, S>,
     fitted: usize,
@@ -139,7 +137,8 @@ fn draws<S: SideModel>(problem: &SideProblem<'_, S>, fit: &SideFit, seed: u64) -
         let off = cholesky.l().transpose().solve_upper_triangular(&unit)?;
         let there = hypothesis_at(&fit.hypothesis, &coordinates, &(&mode + off));
         let mut readings_k = problem.predict(&there)?.swap_remove(0);
-        let mut model_error = CorrelatedNoise::new(fit.model_error_sigma_k[0], correlation_s);
+        let mut model_error =
+            CorrelatedNoise { sigma: fit.model_error_sigma_k[0], correlation_s, last: None };
         for (reading_k, t_s) in readings_k.iter_mut().zip(t_s) {
             *reading_k += model_error.next(*t_s, normal()) + problem.white_k[0] * normal();
         }
@@ -157,10 +156,6 @@ struct CorrelatedNoise {
 }
 
 impl CorrelatedNoise {
-    fn new(sigma: f64, correlation_s: f64) -> Self {
-        CorrelatedNoise { sigma, correlation_s, last: None }
-    }
-
     /// The noise at the next row, from a standard normal number.
     fn next(&mut self, t_s: f64, z: f64) -> f64 {
         let (keep, before) =

@@ -14,7 +14,6 @@ use mapper_numerics::{ROUNDING, parallel};
 use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
 
 pub(crate) struct SearchResult {
-    /// SideFit of the unknowns alone.
     pub(crate) null: SideFit,
     /// Effects and pairs of effects, most probable first.
     pub(crate) fits: Vec<SideFit>,
@@ -23,7 +22,6 @@ pub(crate) struct SearchResult {
 /// Prior probability that a cause is outside the library. Judgement: as small as the remainder of the library priors.
 const PRIOR_OUTSIDE: f64 = 0.1;
 
-/// Logarithm of the prior of a fit's cause, among this number of effects.
 fn prior(calibration: &Calibration, effects: usize, fit: &SideFit) -> f64 {
     prior_of_number(calibration, effects, fit.hypothesis.effects.len())
 }
@@ -36,7 +34,6 @@ pub(crate) fn weight(calibration: &Calibration, effects: usize, fit: &SideFit) -
 /// Start values of an effect, in typical steps from neutral. Bound: effort; a visible size, a large one, and the other side.
 const START_STEPS: [f64; 3] = [1.0, 3.0, -1.0];
 
-/// Start values of an effect.
 fn start_values(info: &EffectInfo) -> Vec<Vec<f64>> {
     let at = |share: f64| -> Vec<f64> {
         let value = |p: &EffectParameter| {
@@ -65,7 +62,6 @@ fn start_values(info: &EffectInfo) -> Vec<Vec<f64>> {
 /// Limits of the search. Bound: effort. Every effect is tried, because the linear gain depends on the model error, which a cause reduces.
 const LIMITS: Limits = Limits { members: 2, starts: 3, fits: 6, slack: f64::INFINITY };
 
-/// Fits no cause, each of the effects, and the most promising pairs.
 pub(crate) fn search<S: SideModel>(
     problem: &SideProblem<'_, S>,
     effects: &[usize],

@@ -89,21 +89,16 @@ pub(crate) fn true_drive(rows: &Rows, rig: &Rig, channel: Channel) -> Vec<f64> {
     }
 }
 
-/// Form of a prior.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Spread {
-    /// Normal about the middle.
     Normal,
     /// Normal in the logarithm: the middle is the median, the width one standard deviation of the logarithm.
     LogNormal,
 }
 
-/// A parameter with its prior.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Parameter {
-    /// Short name.
     pub(crate) name: &'static str,
-    /// Description.
     pub(crate) description: &'static str,
     /// Its unit; empty for a ratio.
     pub(crate) unit: &'static str,
@@ -114,12 +109,10 @@ pub(crate) struct Parameter {
 
 type Text = &'static str;
 
-/// A parameter with a normal prior.
 pub(crate) const fn normal(name: Text, unit: Text, middle: f64, width: f64, description: Text) -> Parameter {
     Parameter { name, description, unit, middle, width, spread: Spread::Normal }
 }
 
-/// A parameter with a log-normal prior.
 pub(crate) const fn log_normal(
     name: Text,
     unit: Text,
@@ -203,7 +196,6 @@ fn line(t_s: &[f64], read: &[f64], i: usize, range: Range<usize>, sigma: f64) ->
 /// Maximum number of rows, evenly spread over a longer log. Bound: five minutes at 10 Hz, enough for every unknown.
 const MAX_ROWS: usize = 3_000;
 
-/// The channels of one side of the machine.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SideChannels<'a> {
     pub(crate) drives: &'a [Channel],
@@ -218,8 +210,7 @@ const MIN_PRESSURE_RATIO: f64 = 1.02;
 /// Share of the spacing at which a row counts as the next. Bound: rounding of times.
 const SPACING_SHARE: f64 = 0.999;
 
-/// Whether a side does enough work for its temperatures to show its efficiency. The equations divide by the flow, which a meter must
-/// distinguish from none.
+/// Whether a side does enough work for its temperatures to show its efficiency; the equations divide by the flow.
 pub(crate) fn does_work(speed_rpm: f64, flow_kg_s: f64, low_pa: f64, high_pa: f64) -> bool {
     let min_flow_kg_s = EXCLUDE_SIGMAS * usual_noise_sigma(Channel::CompressorFlow);
     high_pa >= MIN_PRESSURE_RATIO * low_pa && flow_kg_s >= min_flow_kg_s && speed_rpm > 0.0
@@ -230,7 +221,6 @@ pub(crate) fn does_work(speed_rpm: f64, flow_kg_s: f64, low_pa: f64, high_pa: f6
 pub(crate) struct Rows {
     /// Time, s, rising.
     pub(crate) t_s: Vec<f64>,
-    /// Driving channels, in the requested order.
     pub(crate) drives: Vec<(Channel, Vec<f64>)>,
     /// Their rates of change, per second; empty if not requested.
     pub(crate) rates: Vec<Vec<f64>>,
@@ -241,7 +231,6 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
-    /// Rows of a recording at the times of the first judged channel.
     pub(crate) fn read(recording: &Recording, channels: SideChannels<'_>) -> Result<Self, DrivenError> {
         let Some(first) = channels.judged.first() else {
             return Ok(Rows::default());
@@ -289,7 +278,6 @@ impl Rows {
         Ok(rows)
     }
 
-    /// Number of rows.
     pub(crate) fn len(&self) -> usize {
         self.t_s.len()
     }

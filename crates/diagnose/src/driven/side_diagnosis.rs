@@ -39,7 +39,6 @@ pub struct NotDiagnosable {
     pub effect: String,
     /// Display name.
     pub name: String,
-    /// Reason.
     pub reason: String,
 }
 

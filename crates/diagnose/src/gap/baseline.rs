@@ -21,16 +21,13 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A study of the changes since the reference recording.
 pub(crate) struct Changed {
     pub(crate) study: Study,
     pub(crate) baseline: Baseline,
-    /// Warnings about the reference recording.
     pub(crate) warnings: Vec<GapWarning>,
 }
 
 impl Study {
-    /// Turns this study into one of the changes since a reference recording.
     pub(crate) fn changes_since(
         self,
         name: String,
@@ -95,7 +92,6 @@ impl Study {
     }
 }
 
-/// Model error of each channel.
 fn by_channel(
     study: &Study,
     model_error: &[f64],
@@ -160,7 +156,6 @@ pub struct Declaration {
 pub struct Lacking {
     /// Root mean square, in the channel's unit.
     pub size: f64,
-    /// Unit.
     pub unit: String,
     /// Relative model error of the channel's changes over the recording, 0..1; changes since then may be predicted equally badly.
     pub share: f64,
@@ -168,8 +163,7 @@ pub struct Lacking {
     pub declare: Declaration,
 }
 
-/// Fits the tolerances of a fault-free rig. The misfit sets the noise level, so that model error does not push tolerances outside their
-/// priors.
+/// Fits the tolerances of a fault-free rig; the misfit sets the noise level, so that model error pushes none outside its prior.
 pub(crate) fn fitted_tolerances(study: &Study, linearised: &Linearised) -> Result<Hypothesis, PredictError> {
     let everywhere = Selection::all(study);
     let products = nuisance_products(study, linearised, &everywhere);
@@ -199,8 +193,7 @@ pub(crate) fn fitted_tolerances(study: &Study, linearised: &Linearised) -> Resul
     Ok(best)
 }
 
-/// Rejects a reference recording with steps other than those of the recording under diagnosis. Times may differ by the interval of a slow
-/// logger, T3 by its tolerance: a smaller difference is variation of the stand, not another operating point.
+/// Rejects a reference with other steps. Times may differ by a slow logger's interval, T3 by its tolerance: that is variation of the stand.
 pub(crate) fn same_steps(baseline: &Study, study: &Study) -> Result<(), Problem> {
     if baseline.steps.len() != study.steps.len() {
         return Err(Problem::OtherSteps { baseline: baseline.steps.len(), recorded: study.steps.len() });
@@ -275,8 +268,7 @@ pub(crate) fn errors_of_change(
     })
 }
 
-/// Shift of each step's operating point, 1 sigma, relative to each output's span over the recording. Returns the maximum over all outputs,
-/// of the step and of the one it jumps from.
+/// Shift of each step's operating point, 1 sigma, over each output's span: the maximum over the outputs, the step and the one before.
 pub(crate) fn elsewhere(study: &Study, changed: &[f64]) -> Vec<f64> {
     let spans: Vec<f64> = (0..OUTPUTS.len())
         .map(|output| {
@@ -297,8 +289,7 @@ pub(crate) fn elsewhere(study: &Study, changed: &[f64]) -> Vec<f64> {
     (0..shares.len()).map(|step| shares[step].max(shares[step.saturating_sub(1)])).collect()
 }
 
-/// Errors of each output after fitting the tolerances, which without a declaration would take up most of the errors: those of the nominal
-/// model are declared for the fit.
+/// Errors of each output after fitting the tolerances, which undeclared would take up most of them: those of the nominal model are declared.
 pub(crate) fn measured_structure(study: &Study) -> Result<[Declaration; OUTPUTS.len()], PredictError> {
     let nominal = declarations(study, &study.predict(&study.nothing())?.values);
     let mut declared = study.clone();

@@ -57,8 +57,7 @@ pub struct Found {
     pub effects: Vec<FoundEffect>,
     /// All tolerances and offsets.
     pub tolerances: Vec<FoundTolerance>,
-    /// Covariance of the tolerances in their sigmas, followed by the effects in search coordinates (typical steps, or logarithms if they
-    /// span decades).
+    /// Covariance of the tolerances in sigmas, then of the effects in search coordinates (typical steps, or logarithms over decades).
     pub covariance: Vec<Vec<f64>>,
     /// Why this is not the best explanation of the recording; `None` if it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -79,7 +78,6 @@ pub enum CalibratedModelError {
         "the covariance of the diagnosis does not have {0} rows and columns, one for each tolerance and parameter"
     )]
     Covariance(usize),
-    /// The recording cannot be compared with the model.
     #[error(transparent)]
     Gap(#[from] GapError),
     #[error(transparent)]
@@ -154,7 +152,6 @@ pub struct ChannelCheck {
     pub ratio: f64,
     /// Share of the values within the 95 % band.
     pub inside: f64,
-    /// Unit.
     pub unit: String,
 }
 
@@ -172,8 +169,7 @@ pub struct ForecastCheck {
 }
 
 impl ForecastCheck {
-    /// Compares a calibrated model, driven by the recorded inputs, with a recording to which it was not fitted. The compared values are block means,
-    /// decorrelated within each step; their bands include the noise and the uncertainty of the model.
+    /// Compares a driven calibrated model with a recording that it was not fitted to: decorrelated block means, bands of noise and model.
     pub fn new(
         recorded: &RigRecording,
         effects: Vec<Arc<dyn Effect>>,

@@ -103,8 +103,7 @@ pub struct PointCorrection {
 type Points<'a, T> = &'a dyn Fn(&T) -> Vec<IdentifiedPoint>;
 
 impl Diagnosed {
-    /// Identifies the readings again without the causes found. `identify` takes a recording with the readings to identify, `points` reads the
-    /// points of its result.
+    /// Identifies the readings again without the causes found, by `identify`; `points` reads the points of its result.
     pub fn correct<T, E: From<GapError>>(
         &self,
         recording: &Recording,
@@ -181,16 +180,14 @@ impl Diagnosed {
         Ok(Correction { identified, map, added })
     }
 
-    /// A closure term that removes most of the gap although its form is not the true one: it shows how far an outside cause may move the points.
-    /// With the probability of such a cause times what the term removes.
+    /// A closure term that removes most of the gap in a form other than the true one, and the probability of such a cause times its share.
     fn imitation(&self) -> Option<(f64, &CauseFit)> {
         let Diagnosed { diagnosis, fits, .. } = self;
         let term = diagnosis.closure_terms.first().filter(|_| diagnosis.is_outside_without_closure())?;
         Some((diagnosis.probability_outside * term.gap_reduction, &fits.closures.first()?.fit))
     }
 
-    /// What causes that are not corrected add to a point: what a correction for each of them (weight, points) would change, squared and
-    /// weighted, and the residual of T2 if no closure term describes a cause outside the library.
+    /// What uncorrected causes add to a point: weighted squared changes by their corrections, and T2's residual without a closure term.
     fn by_open_causes(
         &self,
         point: &IdentifiedPoint,
@@ -212,8 +209,7 @@ impl Diagnosed {
         }
     }
 
-    /// The closure term that is more probable than not, with those that the recording does not distinguish from it; else the most probable
-    /// causes of the library that together reach [`CorrectedMap::NEEDED_PROBABILITY`], none if the diagnosis names none.
+    /// The probable closure term with those not distinguished from it; else the causes that together reach [`CorrectedMap::NEEDED_PROBABILITY`].
     fn open_causes(&self) -> OpenCauses<'_> {
         let Diagnosed { diagnosis, fits, .. } = self;
         if let Some(term) = diagnosis.probable_closure_term().filter(|_| !fits.closures.is_empty()) {
@@ -293,7 +289,6 @@ fn ambiguous(best: &[IdentifiedPoint], others: &[Vec<IdentifiedPoint>]) -> Optio
 }
 
 impl AddedUncertainty {
-    /// Widens the intervals of a point.
     pub fn widen(&self, point: &mut IdentifiedPoint) {
         let AddedUncertainty { eta_sigma, h_sigma_w_m2k } = *self;
         let wider = |value: Option<f64>, end: &mut Option<f64>, sigma: f64| {
@@ -322,7 +317,6 @@ impl AddedUncertainty {
     }
 }
 
-/// Adds the correction as a source of uncertainty.
 fn add_row(budget: &mut Option<UncertaintyBudget>, sigma: f64, unit: &str) {
     let Some(known) = budget.take() else { return };
     let mut rows = known.rows;

@@ -10,7 +10,7 @@ use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::{Posterior, rivals, smallest_seen, suspicions, weight};
 use crate::gap::experiment::{Experiment, GapWarning};
 use crate::gap::gap_reduction::{Compared, beyond_prior, held_out_gap};
-use crate::gap::library_fits::LibraryFits;
+use crate::gap::library_fits::{Explained, LibraryFits, explained};
 use crate::gap::next_experiment::{Suggested, next, sensor_near};
 use crate::gap::preconditions::{
     GapError, Prepared, Problem, Zeroed, another_machine, assumed, checked_study, is_of_sensors,
@@ -19,7 +19,6 @@ use crate::gap::report::{Diagnosis, Gap, Next, Place, Verdict};
 use crate::gap::request::{BaselineRecording, ClosureSearch, GapRequest, RigRecording};
 use crate::gap::residuals::study::{Hypothesis, Prediction, Study, members};
 use crate::gap::residuals::whiten::Linearised;
-use crate::gap::verdict::{Explained, explained, verdict};
 use mapper_identify::ZeroOutcome;
 use mapper_observe::model_inputs::step_timing::with_command_times;
 use mapper_physics::rig::effect::{Effect, Submodel};
@@ -55,9 +54,6 @@ pub struct Evidence {
 
 impl Diagnosed {
     /// Runs the model with and without the cause: the closure term if it is more probable than not, else the most probable effects.
-    ///
-    /// # Errors
-    /// [`GapError`] if the model cannot follow the recording.
     pub fn evidence(&self) -> Result<Evidence, GapError> {
         let Diagnosed { diagnosis, study, fits, .. } = self;
         let new = self.library.is_none().then(|| Linearised::new(study)).transpose()?;
@@ -232,7 +228,6 @@ fn gap_on_held_out_steps(library: &LibraryFits, posterior: &Posterior, calibrati
     held_out_gap(compared, &library.folds)
 }
 
-/// Searches outside the library if it leaves a part of the gap.
 fn closure_terms(
     library: &LibraryFits,
     explained: Explained,
@@ -252,7 +247,6 @@ fn closure_terms(
 struct OpenQuestion<'a> {
     verdict: Verdict,
     locations: &'a [Place],
-    /// Whether a closure term describes the cause outside the library.
     has_closure: bool,
 }
 
@@ -300,7 +294,6 @@ fn alike<'a>(library: &'a LibraryFits, posterior: &Posterior) -> Vec<&'a Fit> {
     posterior.alike.iter().map(|place| &library.fits[*place]).collect()
 }
 
-/// Machine parts of some, but not all, of the indistinguishable causes.
 fn inseparable(library: &LibraryFits, posterior: &Posterior) -> Vec<String> {
     let parts = |fit: &Fit| -> BTreeSet<Submodel> {
         let effects = &library.study.effects;
@@ -310,4 +303,25 @@ fn inseparable(library: &LibraryFits, posterior: &Posterior) -> Vec<String> {
     let in_all = |part: &Submodel| parts.iter().all(|of_fit| of_fit.contains(part));
     let some: BTreeSet<Submodel> = parts.iter().flatten().copied().filter(|part| !in_all(part)).collect();
     some.into_iter().map(|part| part.name().to_owned()).collect()
+}
+
+/// After drift subtraction, unmodelled causes below this probability are ignored. The uncertainty of the drift's time history is not in any
+/// tolerance, and its residual resembles a small unmodelled cause. Judgement: as sure as a correction must be
+/// (`NEEDED_PROBABILITY`).
+const SURELY_OUTSIDE: f64 = 0.9;
+
+/// The verdict. No cause is named for a machine that drifts.
+fn verdict(explained: Explained, probability_outside: f64, drift: Option<&DriftReport>) -> Verdict {
+    let sensors_drift = drift.is_some_and(is_of_sensors);
+    let machine_drifts = drift.is_some() && !sensors_drift;
+    match explained {
+        Explained::NothingToExplain => Verdict::WithinTolerance,
+        Explained::All | Explained::Most if machine_drifts => Verdict::Unexplained,
+        Explained::All => Verdict::Explained,
+        Explained::Most => Verdict::PartlyExplained,
+        Explained::Little if sensors_drift && probability_outside < SURELY_OUTSIDE => {
+            Verdict::WithinTolerance
+        }
+        Explained::Little => Verdict::Unexplained,
+    }
 }

@@ -22,8 +22,7 @@ const SAME_OPENING: f64 = 1e-6;
 const UNLIMITED: Effort =
     Effort { iterations: 8, enough: 0.5, max_sigmas: 1e3, max_sigmas_of_rig: 1e3, exact: true };
 
-/// Tolerances of a fit beyond three sigmas of their prior, furthest first. A tolerance at [`MAX_SIGMAS`], which limits the search for causes, is fitted
-/// again without that limit.
+/// Tolerances beyond three sigmas of their prior, furthest first; one at [`MAX_SIGMAS`] is fitted again without that limit.
 pub(crate) fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec<BeyondPrior> {
     let limited = fitted.hypothesis.nuisances.iter().any(|sigmas| sigmas.abs() > LIMITED_SHARE * MAX_SIGMAS);
     let freed =
@@ -55,15 +54,13 @@ pub(crate) struct Folds {
 }
 
 impl Folds {
-    /// The folds of a recording. Each fold covers every opening and speed range as far as the number of steps allows. Empty if there are
-    /// too few steps.
+    /// The folds of a recording, each with every opening and speed range as far as the steps suffice; empty with too few steps.
     pub(crate) fn of(study: &Study) -> Folds {
         let places = study.steps.iter().map(|step| (step.marker.valve_opening_ratio, step.marker.p3_pa));
         Folds::latin_square(&places.collect::<Vec<_>>())
     }
 
-    /// Assigns steps to folds: along each opening in order of pressure (and so speed), starting with a different fold
-    /// at each opening.
+    /// Assigns steps to folds along each opening in order of pressure (and so speed), from a different fold at each opening.
     fn latin_square(places: &[(f64, f64)]) -> Folds {
         if places.len() < 2 * FOLDS {
             return Folds { steps: vec![(0..places.len()).collect()] };
@@ -91,10 +88,8 @@ impl Folds {
     }
 }
 
-/// Gap reduction over several steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct GapReduction {
-    /// Share of the whole gap removed.
     pub(crate) removed: f64,
     /// 95 % interval of this share for similar steps.
     pub(crate) interval: (f64, f64),
@@ -123,9 +118,8 @@ impl StepMisfit {
     }
 }
 
-/// Every step with a gap counts as one trial, whatever its size. The interval is Clopper and Pearson's for the mean share removed. The
-/// share of the whole gap is weighted by size, so one step may dominate it. The interval is then widened to include that share, and the
-/// step is named.
+/// Every step with a gap is one trial, whatever its size. The interval is Clopper and Pearson's for the mean share removed, widened to
+/// include the share of the whole gap, which is weighted by size: one step, which is named, may dominate it.
 pub(crate) fn gap_reduction(steps: &[StepMisfit]) -> GapReduction {
     let positive = |g: f64| g.max(0.0);
     let total: f64 = steps.iter().map(|step| positive(step.before)).sum();
@@ -156,7 +150,6 @@ pub(crate) struct Compared<'a> {
     pub weight: &'a (dyn Fn(&Fit) -> f64 + Sync),
 }
 
-/// Whitened residuals and predicted values of all steps.
 struct Predicted {
     residual: Vec<f64>,
     values: Vec<f64>,
@@ -196,8 +189,7 @@ fn start_within_limits(study: &Study, fit: &Fit) -> Start {
     start
 }
 
-/// Compares tolerances alone with the best cause on held-out steps. Each fold selects among the first few causes and refits, without its
-/// own steps.
+/// Compares tolerances alone with the best cause on held-out steps; each fold selects among the first few causes and refits without its own.
 pub(crate) fn held_out_gap(compared: Compared<'_>, folds: &Folds) -> Gap {
     let Compared { study, linearised: [nominal, _], null, .. } = compared;
     let (before, after) = predict_held_out(compared, folds);
@@ -289,8 +281,7 @@ pub(crate) fn channels_on(
 /// A channel is worse if its residual grows by this ratio, and by more than chance. Bound: a tenth of a residual is not seen on a plot.
 const WORSE_RATIO: f64 = 1.1;
 
-/// Root mean square of measured minus predicted block means of these steps, per channel in its unit: nominal model, fitted tolerances, and
-/// cause. Also returns the channels that the cause makes worse.
+/// Rms of measured minus predicted block means per channel, in its unit: nominal, tolerances, cause; and the channels that get worse.
 fn by_channel(
     study: &Study,
     [nominal, before, after]: [&Predicted; 3],
@@ -335,9 +326,8 @@ fn rise_residual_ratio(study: &Study, step: usize, predicted: &[f64]) -> Option<
     (rise_k > 1.0).then(|| ((study.measured[row] - predicted[row]) / rise_k).abs())
 }
 
-/// Efficiency and heat transfer at the end of each step: with the cause and its tolerances, with these tolerances alone, and for the
-/// nominal model. All use the same speed, pressures and metal temperatures, so a shifted operating point does not appear as an efficiency
-/// change.
+/// Efficiency and heat transfer at the end of each step: with cause and tolerances, with the tolerances alone, nominal. All at the same
+/// speed, pressures and metal temperatures, so a shifted operating point is no change of efficiency.
 fn points(study: &Study, after: &Hypothesis, predicted: &[f64]) -> Vec<PointGap> {
     let tolerances = Hypothesis { nuisances: after.nuisances.clone(), effects: Vec::new() };
     let nothing = study.nothing();

@@ -6,31 +6,25 @@ use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::place::{Gain, places};
 use crate::gap::causes::probabilities::{Posterior, posterior};
 use crate::gap::causes::select::{
-    MAX_EVIDENCE_DEFICIT, Search, close, ranked, refit, search, search_onsets, supported,
+    MAX_EVIDENCE_DEFICIT, MIN_GAP_REDUCTION, Search, close, ranked, refit, search, search_onsets, supported,
 };
 use crate::gap::gap_reduction::Folds;
 use crate::gap::preconditions::GapError;
-use crate::gap::report::{MAX_REFITTED, Place};
+use crate::gap::report::{Gap, MAX_REFITTED, Place};
 use crate::gap::residuals::study::{Study, members};
 use crate::gap::residuals::whiten::Linearised;
 
-/// A recording and the fits of the library to it.
 #[derive(Debug)]
 pub(crate) struct LibraryFits {
     pub(crate) study: Study,
-    /// Linearised at the nominal model.
     pub(crate) linearised: Linearised,
     /// Linearised at the best fit, if the nominal model is far from it.
     at_best: Option<Linearised>,
-    /// Held-out steps, selected before any fit.
     pub(crate) folds: Folds,
-    /// Fit of the tolerances alone.
     pub(crate) null: Fit,
-    /// The closest causes, refitted, best first.
     pub(crate) fits: Vec<Fit>,
     /// All fits of the search, best first.
     searched: Vec<Fit>,
-    /// Tests of the residual of the best fit.
     pub(crate) adequacy: Adequacy,
 }
 
@@ -39,7 +33,6 @@ const FINAL: Effort =
     Effort { iterations: 5, enough: 0.1, max_sigmas: MAX_SIGMAS, max_sigmas_of_rig: MAX_SIGMAS, exact: true };
 
 impl LibraryFits {
-    /// Searches the effects that explain the study best.
     pub(crate) fn new(
         study: Study,
         linearised: Linearised,
@@ -101,7 +94,6 @@ impl LibraryFits {
         self
     }
 
-    /// Probabilities of the causes.
     pub(crate) fn posterior(&self, calibration: &Calibration) -> Posterior {
         posterior(&self.study, calibration, &self.null, &self.fits, &self.adequacy)
     }
@@ -111,13 +103,8 @@ impl LibraryFits {
         self.fits.first().unwrap_or(&self.null)
     }
 
-    /// Linearised at the best fit.
     pub(crate) fn at_best(&self) -> &Linearised {
         self.at_best.as_ref().unwrap_or(&self.linearised)
-    }
-
-    pub(crate) fn adequacy_of(&self, fit: &Fit) -> Adequacy {
-        adequacy(&self.study, &self.linearised, fit)
     }
 
     /// Locations of the gap by the causes of the library: by those that the data do not distinguish if a cause is named, else by all.
@@ -157,4 +144,37 @@ fn compared_at_best(at_best: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
     let (closest, others) = fits.split_at(close(&fits[..fits.len().min(4)], MAX_EVIDENCE_DEFICIT).len());
     let again = refit(at_best, &closest.iter().collect::<Vec<_>>(), FINAL);
     ranked(at_best, again.iter().chain(closest).chain(others))
+}
+
+/// How much of the gap the effect library explains.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Explained {
+    /// There is no gap beyond tolerance.
+    NothingToExplain,
+    /// A cause leaves only noise.
+    All,
+    /// A cause removes most of the gap.
+    Most,
+    /// No cause removes most of the gap.
+    Little,
+}
+
+/// How much of the gap the library explains. A named cause with a probable cause outside the library explains most of it if it removes at least
+/// [`MIN_GAP_REDUCTION`] of the misfit, of its smooth part, and of the gap on held-out steps.
+pub(crate) fn explained(library: &LibraryFits, posterior: &Posterior, gap: &Gap) -> Explained {
+    match (posterior.probabilities.named, posterior.probabilities.unmodelled > 0.5) {
+        (false, false) => return Explained::NothingToExplain,
+        (false, true) => return Explained::Little,
+        (true, false) => return Explained::All,
+        (true, true) => {}
+    }
+    let (null, best) = (&library.null, library.best());
+    let values = null.residual.len() as f64;
+    let removed = 1.0 - (best.cost - values).max(0.0) / (null.cost - values).max(1.0);
+    let [smooth_before, smooth_after] =
+        [&adequacy(&library.study, &library.linearised, null), &library.adequacy]
+            .map(|adequacy| adequacy.smooth_excess);
+    let smooth = 1.0 - smooth_after.max(0.0) / smooth_before.max(1.0);
+    let removes_most = [removed, smooth, gap.gap_reduction].iter().all(|share| *share > MIN_GAP_REDUCTION);
+    if removes_most { Explained::Most } else { Explained::Little }
 }

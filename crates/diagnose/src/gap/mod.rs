@@ -1,5 +1,4 @@
-//! Diagnosis of the gap between the model and a rig: its location, its cause, the gap reduction and the next step. See `docs/explanation/gap.md` for
-//! the method and its limits.
+//! Diagnosis of the gap between the model and a rig: location, cause, gap reduction, next step. Method: `docs/explanation/gap.md`.
 
 pub(crate) mod baseline;
 pub(crate) mod best_fit;
@@ -18,7 +17,6 @@ pub(crate) mod residuals;
 pub(crate) mod scores;
 pub(crate) mod stored;
 pub(crate) mod structure;
-pub(crate) mod verdict;
 
 pub use crate::gap::baseline::Baseline;
 pub use crate::gap::preconditions::GapError;

@@ -31,7 +31,6 @@ pub(crate) const SETTLED_HOUSINGS_S: f64 = 300.0;
 /// Minimum simulated time at a target, s. Bound: the probe settles within it.
 const MIN_DWELL_S: f64 = 10.0;
 
-/// The rig of a recording, for steps that are only simulated.
 #[derive(Debug, Clone)]
 pub(crate) struct SimulatedRig {
     /// Declared tolerances and noise.
@@ -46,8 +45,7 @@ pub(crate) struct SimulatedRig {
     pub actuators: Actuators,
 }
 
-/// A study of simulated steps, whose recording contains only inputs. The machine has settled at `rest`; `driven` is an input that departs from the
-/// campaign's value, at the given times.
+/// A study of simulated steps with inputs alone, settled at `rest`; `driven` is an input that departs from the campaign's value.
 pub(crate) fn simulated_steps(
     rig: SimulatedRig,
     steps: Vec<StepMarker>,
@@ -116,7 +114,6 @@ fn simulated_experiment(recorded: &Study, experiment: &Experiment, interval_s: f
     Some(study)
 }
 
-/// The hypothesis of a fit with an unknown initial state.
 fn with_unknown_start(study: &Study, fit: &Fit) -> Hypothesis {
     let mut hypothesis = fit.hypothesis.clone();
     for (nuisance, sigmas) in study.nuisances.iter().zip(&mut hypothesis.nuisances) {
@@ -174,7 +171,6 @@ pub(crate) fn separation(recorded: &Study, experiment: &Experiment, fits: &[&Fit
     misfit_increases(&predicted)
 }
 
-/// Precision of a fit from the recording, without its initial state.
 fn precision(study: &Study, fit: &Fit) -> DMatrix<f64> {
     let mut precision = fit.precision.clone();
     for (index, nuisance) in study.nuisances.iter().enumerate() {
@@ -187,7 +183,6 @@ fn precision(study: &Study, fit: &Fit) -> DMatrix<f64> {
     precision
 }
 
-/// The recorded jumps, used if no others are declared as allowed.
 pub(crate) fn recorded_jumps(study: &Study, points: &[OperatingPoint]) -> Vec<AllowedJump> {
     let pairs = study.steps.windows(2).zip(points.windows(2));
     pairs
@@ -268,7 +263,6 @@ const THOUSANDTHS: f64 = 1e3;
 /// Share of the open probability above which the first cause is settled.
 pub(crate) const SETTLED: f64 = COVERAGE;
 
-/// Open candidates, best first, with their probabilities.
 pub(crate) struct Rivals<'a> {
     /// At least two fits; the first is the best.
     pub fits: Vec<&'a Fit>,
@@ -276,7 +270,6 @@ pub(crate) struct Rivals<'a> {
     pub probabilities: Vec<f64>,
 }
 
-/// Suggested next step and the alternatives.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Suggested {
     /// The first of `experiments`, or a sensor that the model does not include; `None` if no experiment helps.
@@ -448,7 +441,6 @@ fn gain(probabilities: &[f64], separation: &[Vec<f64>]) -> f64 {
     probabilities.iter().zip(separation).map(row).sum()
 }
 
-/// A sensor that measures a part directly.
 fn sensor_for(part: Submodel) -> &'static str {
     match part {
         Submodel::Actuator | Submodel::TurbineFlow => "a second, fast pressure sensor at the turbine inlet",
@@ -471,7 +463,6 @@ fn sensor_for(part: Submodel) -> &'static str {
     }
 }
 
-/// Expected outcome of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Odds {
     /// Probability that the true cause reaches the requested share of the open causes' probability.
@@ -506,7 +497,6 @@ pub(crate) fn odds(probabilities: &[f64], separation: &[Vec<f64>], temperature: 
     Odds { settles, share, entropy_drop_bit: (entropy_bit(&p) - left_bit).max(0.0) }
 }
 
-/// Posterior probabilities after a reading.
 fn after(p: &[f64], places: &[Vec<f64>], reading: &[f64], temperature: f64) -> Vec<f64> {
     let d2 = |place: &Vec<f64>| place.iter().zip(reading).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
     let d2: Vec<f64> = places.iter().map(d2).collect();

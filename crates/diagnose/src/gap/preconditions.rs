@@ -1,7 +1,6 @@
 //! Prepares a diagnosis, and checks its preconditions.
 
-use crate::drift;
-use crate::drift::{CauseKind, DriftReport, DriftRequest, RecordedRun, without_drift};
+use crate::drift::{self, CauseKind, DriftReport, DriftRequest, RecordedRun, without_drift};
 use crate::gap::best_fit::fit::{Effort, adequacy, fit};
 use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::additions::Calibration;
@@ -33,7 +32,6 @@ const ARRIVED_SHARE: f64 = 0.2;
 /// Maximum median deviation of P3 from its command, as a share. Bound: controllers and regulators hold a few per cent.
 const MAX_COMMAND_ERROR_SHARE: f64 = 0.1;
 
-/// One sentence per assumption.
 pub(crate) fn assumed(study: &Study) -> Vec<String> {
     let t = &study.declared.tolerances;
     let tolerances = [
@@ -164,7 +162,6 @@ pub enum Problem {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum GapError {
-    /// The recording does not fit the campaign, or required data are missing.
     #[error(transparent)]
     Recording(#[from] Problem),
     #[error(
@@ -187,7 +184,6 @@ pub(crate) fn checked_study(
     Ok((Study::with_actuators(recording, table, declared, model, effects, actuators), warnings))
 }
 
-/// Checks a recording; returns warnings for tolerable defects.
 pub(crate) fn usable(
     recording: &Recording,
     table: &Table,
@@ -288,7 +284,6 @@ fn gaps(table: &Table) -> Option<GapWarning> {
     (gaps > 0).then_some(GapWarning::GapsInRecording { gaps, missing_s })
 }
 
-/// A recording ready for the diagnosis.
 pub(crate) struct Prepared {
     pub(crate) zeroed: Zeroed,
     /// The drift that was found, if it is credible; that of sensors is subtracted.
@@ -299,12 +294,10 @@ pub(crate) struct Prepared {
     pub(crate) linearised: Option<Linearised>,
 }
 
-/// A recording with its zero subtracted.
 pub(crate) struct Zeroed {
     pub(crate) recording: Recording,
     pub(crate) declared: Declared,
     pub(crate) zero: ZeroOutcome,
-    /// Sensors with offsets beyond their declaration.
     pub(crate) offsets_at_rest: Vec<OffsetAtRest>,
 }
 
@@ -363,14 +356,12 @@ impl Zeroed {
         Zeroed { recording, declared, zero, offsets_at_rest }
     }
 
-    /// The study of this recording with candidate effects.
     pub(crate) fn study(&self, rig: &RigRecording, effects: Vec<Arc<dyn Effect>>) -> Result<Study, GapError> {
         let (declared, judged) = (self.declared.clone(), rig.tolerances_declared);
         Ok(checked_study(&self.recording, declared, rig.model.clone(), effects, judged)?.0)
     }
 
-    /// The linearised recording if tolerances alone explain it down to noise. In that case apparent drift in repeats is not subtracted,
-    /// because the diagnosis is much more sensitive.
+    /// The linearised recording if tolerances alone explain it: apparent drift is then not subtracted, because the diagnosis is more sensitive.
     fn linearise_noise(
         &self,
         rig: &RigRecording,
@@ -387,7 +378,6 @@ impl Zeroed {
 /// Zero offset, in declared standard deviations, above which a sensor is reported. Source: the usual three sigmas of a control chart (ISO 7870-2).
 const BEYOND_SIGMAS: f64 = 3.0;
 
-/// The sensors whose zero offset exceeds their declaration.
 fn offsets_at_rest(
     zero: &ZeroOutcome,
     declared: &BTreeMap<Channel, DeclaredUncertainty>,

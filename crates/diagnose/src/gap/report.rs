@@ -182,7 +182,6 @@ pub struct ClosureTerm {
 /// One number of a closure term with its 95 % interval.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ClosureCoefficient {
-    /// Name.
     pub term: String,
     /// Best value.
     pub value: f64,
@@ -190,7 +189,6 @@ pub struct ClosureCoefficient {
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// Unit.
     pub unit: String,
 }
 
@@ -201,7 +199,6 @@ pub struct BalanceClosure {
     pub submodel: String,
     /// The missing quantity.
     pub quantity: String,
-    /// Its unit.
     pub unit: String,
     /// Logarithm of its evidence relative to none.
     pub evidence: f64,
@@ -248,7 +245,7 @@ pub struct ChannelGap {
     pub before: f64,
     /// With the best cause.
     pub after: f64,
-    /// Unit.
+    /// Its unit.
     pub unit: String,
 }
 
@@ -268,8 +265,7 @@ pub struct PointGap {
     /// Efficiency with the best cause.
     #[serde(deserialize_with = "nan_where_null")]
     pub eta_after: f64,
-    /// Residual of T2 minus T1 at the end of the step, from a fit to other steps, as an error of the efficiency: what a cause outside the
-    /// library may do to it.
+    /// Residual of T2 - T1 at the end of the step, from a fit to other steps, as an error of the efficiency: what an outside cause may do.
     #[serde(deserialize_with = "nan_where_null")]
     pub eta_residual: f64,
     /// Heat-transfer coefficient of the nominal model, W/(m2 K).
@@ -348,10 +344,8 @@ pub struct Gap {
     pub points: Vec<PointGap>,
 }
 
-/// An operating point of a jump.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct JumpPoint {
-    /// Shaft speed, rpm.
     pub speed_rpm: f64,
     /// Valve opening.
     pub valve: f64,
@@ -460,7 +454,6 @@ pub struct Suggestion {
 }
 
 impl Suggestion {
-    /// Converts to a next step.
     pub(crate) fn as_next(&self) -> Next {
         if let Some(sensor) = &self.sensor {
             return Next::Sensor {

@@ -70,7 +70,6 @@ impl RigRecording {
         }
     }
 
-    /// The declarations of rig and machine.
     pub(crate) fn declared(&self) -> Declared {
         Declared {
             sensors: self.identification.declared.clone(),

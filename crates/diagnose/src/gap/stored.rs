@@ -45,7 +45,6 @@ struct StoredEffect {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum StoredCause {
-    /// An effect of the library.
     Effect {
         id: String,
         #[serde(with = "mapper_core::test_plan::step_number")]
@@ -105,9 +104,6 @@ impl Diagnosed {
     }
 
     /// A diagnosis from its report and its fits. The recording must be the one that was diagnosed, without a reference recording.
-    ///
-    /// # Errors
-    /// [`RestoreError`] if the fits do not belong to the recording.
     pub fn restored(
         (diagnosis, drift, found): (Diagnosis, Option<DriftReport>, Option<Found>),
         stored: StoredFits,
@@ -145,7 +141,6 @@ impl Diagnosed {
 }
 
 impl StoredFit {
-    /// The fit in a study, to which closure terms are added.
     fn restored(&self, study: &mut Study) -> Result<CauseFit, RestoreError> {
         if self.tolerances.len() != study.nuisances.len() {
             return Err(RestoreError::Other);

@@ -19,8 +19,7 @@ pub(crate) fn variation(study: &Study, output: usize) -> Option<(f64, f64)> {
     Some((middle, mean(readings().map(|reading| (reading - middle).powi(2)))?.sqrt()))
 }
 
-/// A repeating part of an output as a whole: its rows, and the reading's share in them. The first is the level, the others are the changes after
-/// each jump that decay with a time constant of [`RESPONSES_S`].
+/// A repeating part of an output: its rows, and the reading's share: the level, or the decay after each jump by one of [`RESPONSES_S`].
 pub(crate) fn repeating_part(study: &Study, output: usize, part: usize) -> Vec<(usize, f64)> {
     let Some((middle, _)) = variation(study, output) else { return Vec::new() };
     let mut before = None;
@@ -48,8 +47,7 @@ pub(crate) fn covariance_of_errors(since_jump_s: &[f64], histories: [&[f64]; 2])
     })
 }
 
-/// Covariance of each group's error that differs from step to step, unit squared; empty if no error is declared. `slopes` are those of
-/// the predicted readings.
+/// Covariance of each group's error that differs from step to step, unit squared; empty if undeclared. `slopes`: of predicted readings.
 pub(crate) fn step_errors(study: &Study, slopes: &[f64]) -> Vec<DMatrix<f64>> {
     let sizes: [f64; OUTPUTS.len()] = std::array::from_fn(|output| {
         let ratio = structure_ratio(&study.declared, output);

@@ -41,9 +41,6 @@ fn describe_missing(expected: u64, found: u64) -> String {
 }
 
 /// Reads a driver's description of its rig. `backend` and `version` are those of its hello.
-///
-/// # Errors
-/// [`InvalidData`] for unknown channels or guards, and for impossible numbers.
 pub fn read_description(
     wire: &Description,
     backend: &str,
@@ -130,7 +127,6 @@ pub fn write_description(rig: &RigDescription) -> Description {
     }
 }
 
-/// The failure as the driver reports it.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 struct ReportedError(String);

@@ -324,9 +324,6 @@ pub fn write_frame(stream: &mut impl Write, body: &[u8], limit_bytes: u32) -> Re
 }
 
 /// Encodes the body of a frame.
-///
-/// # Errors
-/// [`FrameError::Content`] if it cannot be written; no message of this crate causes this.
 pub fn encode(message: &Message, encoding: Encoding) -> Result<Vec<u8>, FrameError> {
     match encoding {
         Encoding::Json => serde_json::to_vec(message).map_err(|error| FrameError::Content(error.to_string())),

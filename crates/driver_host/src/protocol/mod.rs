@@ -1,5 +1,4 @@
-//! The protocol between the host and a driver: frames, messages, and their conversion to the types of [`mapper_core`].
-//! docs/reference/protocol.md specifies it; the JSON schema of the messages is generated from these types.
+//! The protocol between host and driver (docs/reference/protocol.md): frames, messages, their JSON schema, and conversion.
 
 mod convert;
 mod frame;

@@ -114,8 +114,7 @@ fn group_table(group: &RepeatGroup) -> Table {
     table
 }
 
-/// Corrected points as CSV, one row each under the names of [`CorrectedPoint`](mapper_diagnose::drift::CorrectedPoint). Each drift has a column
-/// for its correction, `correction_` and its cause. A missing number is empty.
+/// Corrected points as CSV, a row each, with a column `correction_` and its cause for each drift. A missing number is empty.
 pub fn corrected_csv(report: &DriftReport) -> std::io::Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let heads = [

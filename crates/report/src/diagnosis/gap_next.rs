@@ -55,7 +55,6 @@ pub(crate) fn next_section(diagnosis: &Diagnosis) -> Document {
     document
 }
 
-/// The action, in words.
 pub(crate) fn name_experiment(experiment: &Suggestion) -> String {
     let Suggestion { from, to, .. } = experiment;
     let (from_valve, to_valve) = (valve_area_text(from.valve), valve_area_text(to.valve));
@@ -87,7 +86,6 @@ pub(crate) fn name_experiment(experiment: &Suggestion) -> String {
     }
 }
 
-/// How to run it.
 fn describe_experiment(experiment: &Suggestion) -> String {
     let Suggestion { from, to, .. } = experiment;
     match experiment.kind {
@@ -149,7 +147,6 @@ impl Message for GapWarning {
     }
 }
 
-/// What a sensor reads at rest.
 impl Message for OffsetAtRest {
     fn message(&self) -> String {
         let OffsetAtRest { channel, offset, declared_sigma } = self;

@@ -32,7 +32,6 @@ pub fn forecast_check(check: &ForecastCheck, seal: &str) -> Document {
     document
 }
 
-/// Efficiencies before and after, a row a point.
 pub(crate) fn correction_table(points: &[PointCorrection]) -> Table {
     let value =
         |[eta, low, high]: [f64; 3]| with_margins(100.0 * eta, Margins::new(eta, low, high).scaled(100.0), 1);

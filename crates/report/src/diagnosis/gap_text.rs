@@ -25,7 +25,6 @@ const SHOWN: f64 = 5e-3;
 /// The answer that the cause is not in the library.
 const OUTSIDE: &str = "a cause outside the effect library";
 
-/// The findings without figures.
 impl Describe for Diagnosis {
     fn document(&self) -> Document {
         let mut document = Document::default();
@@ -36,7 +35,6 @@ impl Describe for Diagnosis {
     }
 }
 
-/// The findings with their evidence as figures.
 pub(crate) fn gap_document(diagnosed: &Diagnosed, figures: &Evidence) -> Document {
     let diagnosis = &diagnosed.diagnosis;
     let mut document = Document::default();
@@ -118,7 +116,6 @@ fn causes(diagnosis: &Diagnosis) -> Document {
     document
 }
 
-/// The parts of the machine in order of their share of the gap.
 fn locations(diagnosis: &Diagnosis) -> Document {
     let mut document = Document::default();
     if diagnosis.locations.is_empty() {
@@ -144,7 +141,6 @@ fn locations(diagnosis: &Diagnosis) -> Document {
     document
 }
 
-/// The smallest detectable size of each effect.
 fn detection_limits(effects: &[SmallestSeen]) -> Document {
     let mut document = Document::default();
     if effects.is_empty() {
@@ -201,7 +197,6 @@ fn evidence(diagnosed: &Diagnosed, figures: &Evidence) -> Document {
     document
 }
 
-/// A tolerance outside its prior, in words.
 fn suspect_text(suspect: &BeyondPrior) -> String {
     format!(
         "{} ends {:.1} sigma from its declared value ({})",
@@ -214,7 +209,6 @@ fn suspect_text(suspect: &BeyondPrior) -> String {
 /// Below this probability a closure term closes a gap without being its cause.
 const NOT_THE_TRUTH: f64 = 0.05;
 
-/// The missing term and the closure term for it.
 fn add_closure_terms(document: &mut Document, diagnosis: &Diagnosis) {
     if let (Some(source), Some(place)) =
         (diagnosis.closure_terms_by_balance.first(), diagnosis.locations.first())
@@ -252,7 +246,6 @@ fn add_closure_terms(document: &mut Document, diagnosis: &Diagnosis) {
     }
 }
 
-/// The effect of a closure term on the gap, in words.
 fn describe_removed_residual(term: &ClosureTerm) -> String {
     match term.worse.as_slice() {
         [] => format!("removes {:.0} % of the gap", 100.0 * term.gap_reduction),
@@ -385,7 +378,6 @@ pub(crate) fn part_name(submodel: &str) -> String {
     submodel.split('_').map(word).collect::<Vec<_>>().join(" ")
 }
 
-/// The effect of the library that is closest to an unmodelled cause.
 fn nearest(diagnosis: &Diagnosis) -> Option<String> {
     let first = diagnosis.candidates.first()?;
     match diagnosis.verdict {
@@ -408,7 +400,6 @@ fn candidate_name(candidate: &Candidate) -> String {
     candidate.effects.iter().zip(&candidate.names).map(describe).collect::<Vec<_>>().join(" + ")
 }
 
-/// A cause with its parameters.
 pub(crate) fn cause(candidate: &Candidate) -> String {
     let parameters: Vec<String> = candidate.parameters.iter().map(|(name, e)| parameter(name, e)).collect();
     let separator = if parameters.is_empty() { "" } else { ": " };

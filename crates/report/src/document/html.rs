@@ -10,7 +10,6 @@ impl Document {
         self.html_at(2)
     }
 
-    /// The same with sections of this level.
     fn html_at(&self, level: usize) -> Markup {
         html! { @for block in &self.blocks { (block_html(block, level)) } }
     }
@@ -65,8 +64,7 @@ fn section_html(section: &Section, level: usize) -> Markup {
     }
 }
 
-/// A table that may be wider than the screen: it scrolls separately, by keyboard too. The page's script makes it sortable and adds a copy
-/// button.
+/// A table that may be wider than the screen: it scrolls by keyboard too. The page's script makes it sortable and adds a copy button.
 fn table_html(table: &Table) -> Markup {
     let name = if table.caption.is_empty() { "table" } else { &table.caption };
     html! {
@@ -148,7 +146,6 @@ impl Document {
         self.markdown_at(2)
     }
 
-    /// The same with sections at this level.
     pub(crate) fn markdown_at(&self, level: usize) -> String {
         let mut text = String::new();
         write(&mut text, self, level);

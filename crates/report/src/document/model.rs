@@ -17,7 +17,6 @@ pub trait Describe {
     fn document(&self) -> Document;
 }
 
-/// A part of a document.
 #[derive(Debug, Clone)]
 pub(super) enum Block {
     Paragraph(String, Tone),
@@ -30,7 +29,6 @@ pub(super) enum Block {
     Widget(Widget),
 }
 
-/// The weight of a paragraph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Tone {
     Plain,
@@ -46,22 +44,18 @@ pub(super) struct Facts {
     pub(super) rows: Vec<(String, String)>,
 }
 
-/// Parts of a document below a heading.
 #[derive(Debug, Clone)]
 pub(super) struct Section {
     pub(super) heading: String,
-    /// Name for links and styles of a page.
     pub(super) id: Option<&'static str>,
     /// A page shows it when its heading is clicked.
     pub(super) folded: bool,
     pub(super) body: Document,
 }
 
-/// A part that works only in a browser.
 #[derive(Debug, Clone)]
 pub(super) struct Widget {
     pub(super) html: Markup,
-    /// A picture with the same content, as Markdown; empty without one.
     pub(super) markdown: String,
 }
 
@@ -70,12 +64,10 @@ pub(super) struct Widget {
 pub struct Table {
     pub(super) caption: String,
     pub(super) heads: Vec<String>,
-    /// Whether each column is text.
     pub(super) texts: Vec<bool>,
     pub(super) rows: Vec<Row>,
 }
 
-/// A row of a table.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
     /// Index of the step whose transient a page shows after a click.
@@ -92,11 +84,9 @@ pub struct Cell {
     pub(super) look: Look,
 }
 
-/// The appearance of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Look {
     Plain,
-    /// In the colour of a verdict.
     Verdict(Verdict),
     /// On a ground from white (0) to red (1).
     Heat(f64),
@@ -138,17 +128,14 @@ impl Cell {
         }
     }
 
-    /// The word of a verdict in its colour.
     pub(crate) fn verdict(verdict: Verdict) -> Self {
         Cell { look: Look::Verdict(verdict), ..verdict_word(verdict).into() }
     }
 
-    /// On a ground from white (0) to red (1).
     pub(crate) fn heat(self, share: f64) -> Self {
         Cell { look: Look::Heat(share.clamp(0.0, 1.0)), ..self }
     }
 
-    /// With a bar of this share of the full length.
     pub(crate) fn bar(self, share: f64) -> Self {
         Cell { look: Look::Bar(share.clamp(0.0, 1.0)), ..self }
     }
@@ -162,7 +149,6 @@ impl Table {
         Table { caption: String::new(), heads, texts, rows: Vec::new() }
     }
 
-    /// The same table with a caption.
     pub(crate) fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self
@@ -200,14 +186,12 @@ impl Table {
         self.rows.push(Row { step: None, cells: cells.into_iter().map(Into::into).collect() });
     }
 
-    /// Adds a row about a step, by its index.
     pub(crate) fn row_of_step(&mut self, step: Option<usize>, cells: Vec<Cell>) {
         self.rows.push(Row { step, cells });
     }
 }
 
 impl Section {
-    /// Whether it has nothing that Markdown or a terminal shows.
     pub(super) fn is_for_browsers(&self) -> bool {
         let is_hidden = |block: &Block| matches!(block, Block::Widget(widget) if widget.markdown.is_empty());
         self.body.blocks.iter().all(is_hidden)
@@ -225,12 +209,10 @@ impl Document {
         self.paragraph(text.into(), Tone::Plain);
     }
 
-    /// Adds a paragraph that must not be missed.
     pub(crate) fn strong(&mut self, text: impl Into<String>) {
         self.paragraph(text.into(), Tone::Strong);
     }
 
-    /// Adds a paragraph in the colour of a verdict.
     pub(crate) fn verdict(&mut self, verdict: Verdict, text: impl Into<String>) {
         self.paragraph(text.into(), Tone::Verdict(verdict));
     }
@@ -247,7 +229,6 @@ impl Document {
         self.items(items, false);
     }
 
-    /// Adds a numbered list; an empty one is not added.
     pub(crate) fn numbered<T: Into<String>>(&mut self, items: impl IntoIterator<Item = T>) {
         self.items(items, true);
     }
@@ -275,14 +256,12 @@ impl Document {
         }
     }
 
-    /// Adds figures next to each other.
     pub(crate) fn figures(&mut self, caption: &str, figures: Vec<Figure>) {
         if !figures.is_empty() {
             self.blocks.push(Block::Figures { caption: caption.to_owned(), figures });
         }
     }
 
-    /// Adds lines of a file.
     pub(crate) fn code(&mut self, lines: impl Into<String>) {
         self.blocks.push(Block::Code(lines.into()));
     }
@@ -297,12 +276,10 @@ impl Document {
         self.push_section(heading.into(), None, false, body);
     }
 
-    /// Adds a section with a name for links and styles of a page.
     pub(crate) fn named_section(&mut self, id: &'static str, heading: &str, body: Document) {
         self.push_section(heading.to_owned(), Some(id), false, body);
     }
 
-    /// Adds a section that a page shows when its heading is clicked.
     pub(crate) fn folded_section(&mut self, heading: &str, body: Document) {
         self.push_section(heading.to_owned(), None, true, body);
     }
@@ -318,7 +295,6 @@ impl Document {
         self.blocks.extend(other.blocks);
     }
 
-    /// Names and headings of the sections that have a name.
     pub(crate) fn contents(&self) -> Vec<(&'static str, &str)> {
         let named = self.blocks.iter().filter_map(|block| match block {
             Block::Section(section) => Some((section.id?, section.heading.as_str())),
@@ -328,7 +304,6 @@ impl Document {
     }
 }
 
-/// A verdict in a word.
 pub(crate) fn verdict_word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Good => "good",

@@ -3,21 +3,13 @@
 use mapper_core::Channel;
 use std::fmt;
 
-/// Words and numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sentence(pub(crate) Vec<Part>);
 
-/// A part of a sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Part {
     Words(String),
-    /// Smallest and largest value so far.
-    Number {
-        low: f64,
-        high: f64,
-        decimals: usize,
-        signed: bool,
-    },
+    Number { low: f64, high: f64, decimals: usize, signed: bool },
 }
 
 /// Makes a sentence of a text with `{}` for each of the parts behind it.
@@ -28,7 +20,6 @@ macro_rules! sentence {
 }
 pub(crate) use sentence;
 
-/// A number with so many decimals.
 pub(crate) fn number(value: f64, decimals: usize) -> Part {
     Part::Number { low: value, high: value, decimals, signed: false }
 }
@@ -70,7 +61,6 @@ impl Sentence {
         Sentence(all)
     }
 
-    /// The sentence with another one behind it.
     pub(crate) fn then(mut self, other: Sentence) -> Self {
         self.0.extend(other.0);
         self

@@ -105,7 +105,6 @@ fn is_separated(block: &Block) -> bool {
     matches!(block, Block::Table(_) | Block::Facts(_) | Block::Section(_))
 }
 
-/// Values behind the column of their names.
 fn write_facts(text: &mut String, facts: &Facts) {
     if !facts.caption.is_empty() {
         text.push_str(&wrapped(&facts.caption, COLUMNS, 2));
@@ -120,7 +119,6 @@ fn write_facts(text: &mut String, facts: &Facts) {
     }
 }
 
-/// The table with its verdicts in colour.
 fn painted(table: &Table, paint: Paint) -> String {
     let verdicts = [Verdict::Good, Verdict::Doubtful, Verdict::Unusable];
     let cells = || table.rows.iter().flat_map(|row| &row.cells);
@@ -132,8 +130,7 @@ fn painted(table: &Table, paint: Paint) -> String {
     })
 }
 
-/// A table that fits 80 columns. If it is too wide, its heads are broken into lines, then its texts; a table that is still too wide
-/// continues below itself, with its first column repeated.
+/// A table in 80 columns: its heads are broken into lines, then its texts, then it continues below with its first column repeated.
 fn laid_out(table: &Table) -> String {
     let every_column: Vec<usize> = (0..table.heads.len()).collect();
     let has_texts = table.texts.iter().skip(1).any(|is_text| *is_text);
@@ -215,8 +212,7 @@ fn fits(text: &str) -> bool {
     text.lines().all(|line| line.chars().count() <= COLUMNS)
 }
 
-/// Wraps text to `columns` characters if words allow it; continuation lines are indented, and a number stays with its unit. Ends with a line
-/// end.
+/// Wraps text to `columns` if words allow it and ends the line; continuations are indented, and a number stays with its unit.
 pub fn wrapped(text: &str, columns: usize, indent: usize) -> String {
     let mut lines = String::new();
     for line in text.lines() {

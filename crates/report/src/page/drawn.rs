@@ -13,7 +13,6 @@ use mapper_identify::{DynamicEfficiency, FittedReadings};
 use mapper_numerics::statistics::{mean, rms};
 use serde::Serialize;
 
-/// The map without its points.
 #[derive(Debug, Clone, Serialize, Default)]
 pub(crate) struct DrawnMap {
     lines: Vec<DrawnLine>,
@@ -46,7 +45,6 @@ struct DrawnEta {
     half: f64,
 }
 
-/// Lines of one efficiency, %.
 #[derive(Debug, Clone, Serialize)]
 struct DrawnContour {
     eta: f64,
@@ -61,7 +59,6 @@ struct DrawnMark {
     pr: f64,
 }
 
-/// Everything except the points.
 pub(crate) fn drawn_map(map: &CompressorMap, display: &Display) -> DrawnMap {
     let flow = |kg_s: f64| rounded(display.number(Kind::MassFlow, kg_s));
     let place = |(kg_s, ratio): (f64, f64)| [flow(kg_s), rounded(ratio)];
@@ -154,13 +151,11 @@ pub(crate) struct DrawnPoint {
     h: Option<f64>,
     h_low: Option<f64>,
     h_high: Option<f64>,
-    /// Result of the dynamic method.
     dynamic: Option<[f64; 3]>,
     valve: Option<f64>,
     verdict: &'static str,
     repeat: bool,
     warnings: Vec<String>,
-    /// Readings at the end of the step, as displayed.
     raw: Vec<String>,
 }
 
@@ -225,7 +220,6 @@ fn declared(half: f64) -> Option<f64> {
     (half > 0.0).then_some(half)
 }
 
-/// Readings at the end of a step: symbol, value and unit.
 fn raw(report: &RunReport<'_>, step: usize, display: &Display) -> Vec<String> {
     let marker = report.recording.steps.iter().find(|marker| marker.index == step);
     let read = |channel| marker.and_then(|marker| at_end(report.recording, marker, channel));
@@ -279,7 +273,6 @@ struct DrawnFit {
     rms_k: f64,
 }
 
-/// All steps that a point was identified from.
 pub(crate) fn drawn_steps(report: &RunReport<'_>, display: &Display) -> Vec<DrawnStep> {
     let markers = report.recording.steps.iter();
     markers

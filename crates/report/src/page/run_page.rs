@@ -26,7 +26,6 @@ const STEPS: &str = include_str!("../../assets/steps.js");
 const TABLES: &str = include_str!("../../assets/tables.js");
 const LIVE: &str = include_str!("../../assets/live.js");
 
-/// Purpose of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// To keep: it works from disk and makes no requests.
@@ -38,7 +37,6 @@ pub(crate) enum Purpose {
 }
 
 impl Purpose {
-    /// Parts of the page's own script, in order.
     fn scripts(self) -> &'static [&'static str] {
         match self {
             Purpose::Kept => &[D3, PLOT, COMMON, MAP, STEPS, TABLES],
@@ -128,7 +126,6 @@ pub fn gap_page(
     shell(&title, &title, Purpose::Still, &(), &body)
 }
 
-/// Data of the script.
 #[derive(Serialize)]
 struct PageData {
     units: DisplayUnits,
@@ -149,7 +146,7 @@ impl RunReport<'_> {
     pub fn page(&self) -> Result<String, serde_json::Error> {
         let display = self.display();
         let drawn = PageData {
-            units: display.units().clone(),
+            units: display.units.clone(),
             points: drawn_points(self, &display),
             map: self.results.map.map(|map| drawn_map(map, &display)).unwrap_or_default(),
             steps: drawn_steps(self, &display),
@@ -218,8 +215,7 @@ pub fn target_line_name(speed_rpm: f64, campaign: &Campaign, display: &Display) 
     display.line_name(campaign.reference.corrected_speed_rpm(speed_rpm, campaign.boundary.t1_k))
 }
 
-/// The map of the points so far: contours between lines that have two points each, by the mesh of the finished map. Empty
-/// if there is none yet.
+/// The map of the points so far: contours between lines of two points or more, by the mesh of the finished map. Empty if there is none.
 pub fn live_map(points: &[IdentifiedPoint], campaign: &Campaign, display: &Display) -> LiveMap {
     let Some(first) = points.first() else { return LiveMap::default() };
     let (machine, reference) = (&campaign.machine.name, campaign.reference);

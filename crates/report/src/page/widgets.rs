@@ -24,9 +24,8 @@ const LAYERS: [(&str, &str, bool); 6] = [
     ("dynamic", "dynamic method", false),
 ];
 
-/// The interactive map.
 pub(crate) fn map_widget(results: &PointResults<'_>, others: &[OtherRun<'_>], display: &Display) -> Markup {
-    let speed = &display.units().speed;
+    let speed = &display.units.speed;
     let has_dynamic = !results.dynamic.is_empty();
     html! {
         fieldset.layers.screen {
@@ -48,7 +47,6 @@ pub(crate) fn map_widget(results: &PointResults<'_>, others: &[OtherRun<'_>], di
     }
 }
 
-/// Legend of the symbols that are present.
 fn legend(results: &PointResults<'_>) -> Markup {
     let PointResults { map, points, .. } = *results;
     let has = |verdict| points.iter().any(|scored| scored.point.verdict == verdict);
@@ -74,7 +72,6 @@ fn legend(results: &PointResults<'_>) -> Markup {
     }
 }
 
-/// The transient of one point.
 pub(crate) fn step_widget(results: &PointResults<'_>, display: &Display) -> Markup {
     html! {
         p.screen {
@@ -82,7 +79,7 @@ pub(crate) fn step_widget(results: &PointResults<'_>, display: &Display) -> Mark
             select #step-choice {
                 @for point in results.identified() {
                     option value=(step_number(point.step)) {
-                        (step_name(point)) " · " (display.speed(point.speed_rpm)) " " (display.units().speed)
+                        (step_name(point)) " · " (display.speed(point.speed_rpm)) " " (display.units.speed)
                         @if point.valve_opening_ratio.is_finite() { " · valve area " (valve_area_text(point.valve_opening_ratio)) }
                     }
                 }
@@ -93,7 +90,6 @@ pub(crate) fn step_widget(results: &PointResults<'_>, display: &Display) -> Mark
     }
 }
 
-/// The jumps on the map.
 pub(crate) fn plan_widget() -> Markup {
     html! {
         figure { div #plan-plot {} figcaption { "The jumps in their order, the first ones darkest. The numbers are steps; the table has those without space here." } }

@@ -4,6 +4,7 @@ use crate::document::{Document, Table};
 use crate::formatting::{Display, Message, duration, percent, significant_digits};
 use crate::test_report::key_figures::assumed_keys;
 use crate::test_report::zero_and_sensors::declared_sensors;
+use mapper_campaign::units::Kind;
 use mapper_campaign::{Campaign, ResolvedLine, ResolvedPoint};
 use mapper_core::{
     Advice, CampaignChange, Channel, PlanRemark, UndeclaredForecast, VerdictForecast, half_width_95,
@@ -67,7 +68,6 @@ impl crate::document::Describe for CheckedCampaign<'_> {
     }
 }
 
-/// The expected verdicts, and each change that improves them.
 fn add_forecast(document: &mut Document, campaign: &Campaign, forecast: &VerdictForecast, advice: &[Advice]) {
     document.text(format!("Expected if the machine is as declared: {}", verdicts(forecast)));
     if let Some(UndeclaredForecast { good, eta_standard_error }) = forecast.undeclared {
@@ -130,14 +130,13 @@ fn change_text(change: CampaignChange) -> String {
     }
 }
 
-/// Each speed line with the first and last of its points.
 fn add_lines(document: &mut Document, campaign: &Campaign, lines: &[ResolvedLine]) {
     let display = Display::new(&campaign.display);
     let mut rows = Table::new([
-        display.speed_head("corrected"),
-        display.speed_head("physical"),
+        display.head("corrected", Kind::Speed),
+        display.head("physical", Kind::Speed),
         "points".to_owned(),
-        display.flow_head("corrected flow"),
+        display.head("corrected flow", Kind::MassFlow),
         "PR".to_owned(),
         "valve area".to_owned(),
         "surge margin %".to_owned(),

@@ -3,6 +3,7 @@
 use crate::document::{Cell, Document, Table};
 use crate::formatting::{Display, Message, duration, eta, number, percent};
 use mapper_campaign::Campaign;
+use mapper_campaign::units::Kind;
 use mapper_chart::{Annotation, Axis, Colour, Figure, Line, Panel, PointLabels, Scatter};
 use mapper_core::{
     AvoidedCrossing, OperatingPoint, Plan, PlanStep, Recording, StepKind, Transition, WindowRule,
@@ -20,12 +21,12 @@ pub fn plan_document(campaign: &Campaign, plan: &Plan) -> Document {
     let display = Display::new(&campaign.display);
     let mut steps = Table::new([
         "step".to_owned(),
-        display.speed_head("N"),
+        display.head("N", Kind::Speed),
         "valve".to_owned(),
-        display.pressure_head("P3"),
-        display.flow_head("m_c"),
+        display.head("P3", Kind::Pressure),
+        display.head("m_c", Kind::MassFlow),
         "PR".to_owned(),
-        display.temperature_head("T2"),
+        display.head("T2", Kind::Temperature),
         "dTc K".to_owned(),
         "+/- pts".to_owned(),
         "settles s".to_owned(),
@@ -56,7 +57,6 @@ pub fn plan_document(campaign: &Campaign, plan: &Plan) -> Document {
     document
 }
 
-/// The mark of a step that is not a point of the grid.
 fn mark(kind: StepKind) -> &'static str {
     match kind {
         StepKind::Point => "",
@@ -87,7 +87,6 @@ fn legend(plan: &Plan) -> String {
     )
 }
 
-/// Totals of the plan, a line for each figure.
 fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> Vec<(&'static str, String)> {
     let figures = &plan.figures;
     let steps_s: f64 = plan.steps.iter().map(|step| step.dwell_s).sum();
@@ -199,7 +198,6 @@ fn steps(steps: &[PlanStep]) -> String {
     }
 }
 
-/// Time of the steps, minutes.
 fn minutes(plan: &Plan) -> f64 {
     plan.steps.iter().map(|step| step.dwell_s).sum::<f64>() / 60.0
 }
@@ -304,13 +302,11 @@ pub fn jump_forecast(campaign: &Campaign, jump: &JumpForecast) -> Document {
     document
 }
 
-/// The time within a range of speeds to avoid.
 pub(crate) fn avoided_time(AvoidedCrossing { range, inside_s }: &AvoidedCrossing) -> String {
     let (from_krpm, to_krpm) = (range.from_rpm / 1e3, range.to_rpm / 1e3);
     format!("{inside_s:.1} s in {from_krpm} to {to_krpm} krpm, {:.1} s allowed", range.longest_s)
 }
 
-/// A row for each step of the plan.
 pub(crate) fn executed_plan_table(
     plan: &Plan,
     recording: &Recording,
@@ -319,9 +315,9 @@ pub(crate) fn executed_plan_table(
 ) -> Table {
     let mut table = Table::new([
         "step".to_owned(),
-        display.speed_head("from @ valve area,"),
-        display.speed_head("to @ valve area,"),
-        display.speed_head("N reached"),
+        display.head("from @ valve area,", Kind::Speed),
+        display.head("to @ valve area,", Kind::Speed),
+        display.head("N reached", Kind::Speed),
         "lasted s".to_owned(),
         "planned s".to_owned(),
         "dTc K".to_owned(),
@@ -420,7 +416,6 @@ fn figures(plan: &Plan) -> String {
     format!("total gradient {:.0} K in {minutes:.0} min", plan.figures.sum_gradient_k)
 }
 
-/// The map without a path.
 fn speed_lines(grid: &[(OperatingPoint, (f64, f64))]) -> Panel {
     let ends =
         |worse: f64, pick: fn(f64, f64) -> f64| grid.iter().map(|(_, place)| place.0).fold(worse, pick);

@@ -13,13 +13,11 @@ use mapper_core::{
 pub struct Doubt<'a> {
     /// Steps, from 1, in order.
     steps: Vec<usize>,
-    /// Its kind.
     pub code: &'a str,
     sentence: Sentence,
 }
 
-/// All remarks on the points, in order of the first step of each. Warnings that differ only in their values are merged into one, with the range
-/// of each value. The exact sentence of a step is shown with its point.
+/// All remarks on the points, in order of first step. Warnings that differ only in values are merged into one with their range.
 pub fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<Doubt<'a>> {
     let mut merged: Vec<Doubt<'a>> = Vec::new();
     for point in points {

@@ -1,9 +1,9 @@
-//! Tables of identified points: one description of each column, for terminal, report and page; whether two methods agree at a point, and the
-//! share of the errors that all points have in common.
+//! Tables of identified points, one description of each column for all outputs; agreement of two methods, and errors common to all points.
 
 use crate::document::{Cell, Document, Table, verdict_word};
 use crate::formatting::{Display, number, percent};
 use Column as C;
+use mapper_campaign::units::Kind;
 use mapper_core::{
     Channel, CompressorMap, IdentifiedPoint, Recording, SpeedLine, StepKind, StepMarker, Verdict, Warning,
     half_width_95, step_number, valve_area_text,
@@ -12,7 +12,6 @@ use mapper_identify::DynamicEfficiency;
 use mapper_numerics::statistics::{mean, median};
 use mapper_recording::score::ScoredPoint;
 
-/// A column of a table of points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Column {
     Step,
@@ -83,18 +82,18 @@ impl Column {
     fn head(self, display: &Display) -> String {
         match self {
             C::Step => "step".to_owned(),
-            C::Speed => display.speed_head("N"),
-            C::SpeedCorrected => display.speed_head("N corr."),
+            C::Speed => display.head("N", Kind::Speed),
+            C::SpeedCorrected => display.head("N corr.", Kind::Speed),
             C::Opening => "valve area".to_owned(),
-            C::Flow => display.flow_head("flow corr."),
+            C::Flow => display.head("flow corr.", Kind::MassFlow),
             C::FlowMargin | C::PressureRatioMargin | C::EtaMargin | C::HMargin => "+/-".to_owned(),
             C::PressureRatio => "PR".to_owned(),
             C::Eta => "eta %".to_owned(),
             C::EtaAllowance => "else".to_owned(),
             C::H => "h W/(m2 K)".to_owned(),
             C::T2Change => "dT2 K".to_owned(),
-            C::T1 => display.temperature_head("T1"),
-            C::P1 => display.pressure_head("P1"),
+            C::T1 => display.head("T1", Kind::Temperature),
+            C::P1 => display.head("P1", Kind::Pressure),
             C::Read(channel) => format!("{channel} {}", display.unit_of(channel)),
             C::Verdict => "verdict".to_owned(),
             C::TrueEta => "true eta %".to_owned(),
@@ -144,7 +143,6 @@ impl Column {
     }
 }
 
-/// A table of points with these columns.
 fn points_table<'a>(
     columns: &[Column],
     points: impl Iterator<Item = &'a ScoredPoint>,
@@ -172,7 +170,7 @@ pub(crate) fn point_tables(
         let own_points = points_of_line(points, |step| line.points.iter().any(|p| p.identified.step == step));
         on_a_line.extend(own_points.iter().map(|scored| scored.point.step));
         let caption =
-            format!("{} {} corrected", display.line_name(line.speed_corrected_rpm), display.units().speed);
+            format!("{} {} corrected", display.line_name(line.speed_corrected_rpm), display.units.speed);
         tables.push(points_table(&REPORT, own_points.into_iter(), Some(recording), display).caption(caption));
     }
     let caption = if tables.is_empty() { "Points" } else { "Repeats, and points that are not on the map" };
@@ -181,7 +179,6 @@ pub(crate) fn point_tables(
     tables
 }
 
-/// The points of a line from surge to choke.
 fn points_of_line(points: &[ScoredPoint], is_on_it: impl Fn(usize) -> bool) -> Vec<&ScoredPoint> {
     let mut own_points: Vec<&ScoredPoint> =
         points.iter().filter(|scored| is_on_it(scored.point.step)).collect();
@@ -199,15 +196,14 @@ fn with_truth(points: &[ScoredPoint], truth: bool) -> bool {
     truth && points.iter().any(|scored| scored.truth.is_some())
 }
 
-/// The points of the map by speed line from surge to choke, followed by the points outside it; without repeats, which serve only
-/// for comparison. With their true efficiency if `truth` is set and it is known. It fits a terminal.
+/// The points by speed line from surge to choke, then those outside the map; without repeats. With true efficiencies if `truth` and known.
 pub(crate) fn points_by_line(
     points: &[ScoredPoint],
     map: Option<&CompressorMap>,
     display: &Display,
     truth: bool,
 ) -> Document {
-    let units = display.units();
+    let units = &display.units;
     let with_truth = with_truth(points, truth);
     let mut heads: Vec<&str> =
         vec![&units.speed, "step", "valve area", &units.flow, "PR", "eta %", "+/-", "h", "+/-"];
@@ -286,7 +282,6 @@ fn speed_lines(points: &[ScoredPoint], map: Option<&CompressorMap>) -> Vec<(f64,
     groups.map(line).collect()
 }
 
-/// Number of points with each verdict, in a sentence.
 pub(crate) fn verdict_sentence<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> String {
     let verdicts: Vec<Verdict> = points.map(|point| point.verdict).collect();
     let count = |verdict| verdicts.iter().filter(|other| **other == verdict).count();
@@ -319,7 +314,6 @@ pub(crate) fn allowance_sentence<'a>(points: impl Iterator<Item = &'a Identified
     ))
 }
 
-/// The number of a point's step, from 1, and whether it is a repeat.
 pub(crate) fn step_name(point: &IdentifiedPoint) -> String {
     match point.kind {
         StepKind::Point => step_number(point.step).to_string(),
@@ -361,7 +355,7 @@ pub fn disagreement_text(
         100.0 * distance,
         step_number(point.step),
         display.speed(point.speed_rpm),
-        display.units().speed,
+        display.units.speed,
         valve_area_text(point.valve_opening_ratio),
         100.0 * other.eta,
         100.0 * point.eta.unwrap_or(f64::NAN),
@@ -377,8 +371,7 @@ fn are_disjoint(point: &IdentifiedPoint, other: &DynamicEfficiency) -> bool {
     other.eta_high < low || high < other.eta_low
 }
 
-/// One sentence for the slowest speed and the others, because the effect of offsets decreases with the square of the speed; `None` if no
-/// point has an interval with a common part.
+/// One sentence each for the slowest speed and the others: offsets matter less at speed. `None` without a common part.
 pub fn shared_errors_text<'a>(
     points: impl Iterator<Item = &'a IdentifiedPoint>,
     display: &Display,
@@ -400,7 +393,7 @@ pub fn shared_errors_text<'a>(
         let common = half(|point| Some(half_width_95(point.common.eta_standard_error())))?;
         Some(format!("+/- {common:.2} of the +/- {total:.2} points"))
     };
-    let first = format!("{} at {} {}", describe(&slow)?, display.speed(slowest_rpm), display.units().speed);
+    let first = format!("{} at {} {}", describe(&slow)?, display.speed(slowest_rpm), display.units.speed);
     let parts = match describe(&fast) {
         Some(others) => format!("{first}, {others} at higher speeds"),
         None => first,

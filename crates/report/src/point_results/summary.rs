@@ -40,13 +40,11 @@ pub struct PointResults<'a> {
 }
 
 impl<'a> PointResults<'a> {
-    /// The points without their truth.
     pub(crate) fn identified(&self) -> impl Iterator<Item = &'a IdentifiedPoint> + use<'a> {
         self.points.iter().map(|scored| &scored.point)
     }
 
-    /// The points for a terminal, and the reasons against them. `more`: the command that shows the rest, in words; `warnings`: problems of
-    /// the recordings; `truth`: with the simulator's truth.
+    /// The points for a terminal, and reasons against them. `more`: the command for the rest; `warnings`: of the recordings; `truth`: with it.
     pub fn short(&self, display: &Display, more: &str, warnings: &[String], truth: bool) -> Document {
         let mut document = Document::default();
         document.text(disagreement_text(self.points, self.dynamic, display).unwrap_or_default());
@@ -115,7 +113,6 @@ impl<'a> PointResults<'a> {
         warnings.iter().for_each(|warning| document.text(format!("recording: {warning}")));
     }
 
-    /// The verdict of all points, and what they all depend on.
     fn conclusion(&self) -> Document {
         let has = |verdict| self.identified().any(|point| point.verdict == verdict);
         let worst = [Verdict::Unusable, Verdict::Doubtful].into_iter().find(|verdict| has(*verdict));
@@ -129,7 +126,6 @@ impl<'a> PointResults<'a> {
     }
 }
 
-/// One sentence for each repeated jump.
 fn repeats_section(jumps: &[RepeatedJump], display: &Display) -> Document {
     let sentence = |jump: &RepeatedJump| {
         let found: Vec<String> = jump.eta.iter().map(|eta| format!("{:.2}", 100.0 * eta)).collect();
@@ -150,7 +146,6 @@ fn repeats_section(jumps: &[RepeatedJump], display: &Display) -> Document {
     document
 }
 
-/// Deviations of the points from the simulator's truth.
 pub(crate) fn score_sentences(score: &ScoreSummary) -> Vec<String> {
     let mut sentences = vec![format!(
         "Against the simulator's truth ({} points): median error of efficiency {:.2} points, {:.2} at worst, {:.0} % \

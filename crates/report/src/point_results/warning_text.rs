@@ -370,7 +370,6 @@ fn describe_suspected_fault(fault: &SuspectedFault) -> Sentence {
     )
 }
 
-/// Steps and times are words: each conflict is its own.
 fn steps_contradict(conflict: &StepConflict) -> Sentence {
     Sentence::from(match conflict {
         StepConflict::Overlap { first, first_start_s, first_end_s, second, second_start_s, second_end_s } => {

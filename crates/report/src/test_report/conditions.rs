@@ -171,8 +171,7 @@ fn rest_reading(zero: Option<&IsothermalZero>, channel: Channel) -> Option<f64> 
     zero.common.iter().find(|common| common.channels.contains(&channel)).map(|common| common.reading)
 }
 
-/// The error at a reading: the offset `offset`, and the gain over the distance from the reading at rest, or from that of the calibration. A zero
-/// determines the offset at rest; at 130 degC the gain adds to it.
+/// The error at a reading: `offset`, and the gain over the distance from the reading at rest (with a zero) or from the calibration.
 fn as_used(
     channel: Channel,
     used: &DeclaredUncertainty,
@@ -257,7 +256,6 @@ pub struct JudgedPoints<'a> {
     pub recording: &'a Recording,
     pub gases: Gases,
     pub points: &'a [ScoredPoint],
-    /// Uncertainty of each channel used in the identification.
     pub used: &'a BTreeMap<Channel, DeclaredUncertainty>,
 }
 
@@ -326,7 +324,6 @@ fn acceptance_words(report: &JudgedPoints<'_>) -> Option<String> {
     ))
 }
 
-/// Criteria and results; empty without criteria.
 pub(crate) fn acceptance_section(report: &JudgedPoints<'_>) -> Document {
     let mut document = Document::default();
     let heads = ["criterion", "limit, %", "largest, %", "result", "steps that fail"];

@@ -17,7 +17,7 @@ pub fn key_figures(
 ) -> Option<String> {
     let (all, map) = (points.len(), map?);
     let display = campaign.map_or_else(Display::default, |campaign| Display::new(&campaign.display));
-    let unit = &display.units().speed;
+    let unit = &display.units.speed;
     let on_map: usize = map.lines.iter().map(|line| line.points.len()).sum();
     let speeds = || map.lines.iter().map(|line| line.speed_corrected_rpm);
     let slowest = display.line_name(speeds().fold(f64::INFINITY, f64::min));
@@ -65,7 +65,6 @@ pub fn key_figures(
     Some(phrases)
 }
 
-/// Width of the intervals of usable points.
 fn certainty<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Option<String> {
     let usable = points.filter(|point| point.verdict != Verdict::Unusable);
     let all: Vec<Margins> = usable.filter_map(|point| Some(point.eta_margins_95()?.scaled(100.0))).collect();
@@ -98,12 +97,10 @@ pub enum PointsOrigin {
 }
 
 impl PointsOrigin {
-    /// Whether every planned step is among the points.
     pub(crate) fn is_complete(&self) -> bool {
         !matches!(self, PointsOrigin::Run(ending) if *ending != RunEnding::Completed)
     }
 
-    /// One sentence.
     pub(crate) fn sentence(&self) -> String {
         match self {
             PointsOrigin::Run(ending) => ending.message(),
@@ -156,7 +153,6 @@ fn sentence_with(campaign: &Campaign, name: fn(&AssumedSize) -> &str) -> Option<
     ))
 }
 
-/// The same by keys of the campaign.
 pub(crate) fn assumed_keys(campaign: &Campaign) -> Option<String> {
     sentence_with(campaign, |size| &size.key)
 }

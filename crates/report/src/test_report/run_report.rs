@@ -5,13 +5,12 @@ use crate::document::{Document, Table};
 use crate::formatting::{Display, Message, duration};
 use crate::page::widgets::{OtherRun, map_widget, plan_widget, step_widget};
 use crate::plan::plan_document::{avoided_time, executed_plan_table};
-use crate::point_results::budget_table::budget_section;
+use crate::point_results::point_tables::{budget_section, wheel_section};
 use crate::point_results::point_warnings::doubts;
 use crate::point_results::points::{
     END_S, allowance_sentence, disagreement_text, point_tables, shared_errors_text, verdict_sentence,
 };
 use crate::point_results::summary::{PointResults, score_sentences};
-use crate::point_results::wheel_table::wheel_section;
 use crate::test_report::conditions::{
     JudgedPoints, acceptance_section, balance_section, condition_table, instruments_section, witness_table,
 };
@@ -91,7 +90,6 @@ pub struct ReportSource {
 }
 
 impl RunReport<'_> {
-    /// The campaign's display units, or the usual ones.
     pub(crate) fn display(&self) -> Display {
         self.campaign.map_or_else(Display::default, |campaign| Display::new(&campaign.display))
     }
@@ -128,12 +126,10 @@ impl RunReport<'_> {
         document
     }
 
-    /// Whether the recording contains the simulator's truth.
     fn is_simulated(&self) -> bool {
         self.results.points.iter().any(|scored| scored.truth.is_some())
     }
 
-    /// Good if the map can be used as it is, without a condition.
     pub(crate) fn verdict(&self) -> Verdict {
         let PointResults { points, map, remarks, .. } = self.results;
         let is_clean = !points.is_empty()
@@ -175,7 +171,6 @@ impl RunReport<'_> {
         document
     }
 
-    /// Actions in order of importance, each a sentence.
     fn recommended_actions(&self) -> Vec<String> {
         let PointResults { points, dynamic, zero, .. } = self.results;
         let mut actions: Vec<String> = Vec::new();
@@ -195,7 +190,6 @@ impl RunReport<'_> {
         actions
     }
 
-    /// The number of surges outside a search for surge.
     fn surges(&self) -> Option<String> {
         let approaches = self.recording.steps.iter().filter(|step| step.kind == StepKind::Approach);
         let searched_from_s = approaches.map(|step| step.start_s).fold(f64::INFINITY, f64::min);
@@ -212,7 +206,6 @@ impl RunReport<'_> {
         ))
     }
 
-    /// All sections.
     pub(crate) fn body(&self) -> Document {
         let display = self.display();
         let mut document = Document::default();
@@ -366,8 +359,7 @@ impl RunReport<'_> {
 /// Maximum number of events in a report. Judgement: more are not read; the recording has all of them.
 const MAX_EVENTS: usize = 200;
 
-/// A formatted time since 1970-01-01 UTC, ns; `None` for 0: simulated time starts there, and so does a log that knows
-/// only seconds, which is not a date.
+/// A formatted time since 1970-01-01 UTC, ns; `None` for 0, the start of simulated time and of logs that know only seconds.
 pub fn instant(ns: u64) -> Option<String> {
     let seconds = i64::try_from(ns / 1_000_000_000).ok().filter(|seconds| *seconds > 0)?;
     Some(jiff::Timestamp::from_second(seconds).ok()?.strftime("%Y-%m-%d %H:%M:%S UTC").to_string())
@@ -411,7 +403,6 @@ fn stated(value: Option<&str>) -> String {
     value.unwrap_or("not stated").to_owned()
 }
 
-/// The declared conditions of rig and cell: name and value in words.
 fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     let mut rows = report.campaign.map(campaign_rows).unwrap_or_default();
     if report.is_simulated()
@@ -425,7 +416,6 @@ fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     rows
 }
 
-/// Method and settings behind the numbers: name and value in words.
 fn provenance_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     let mut rows = vec![("program", report.program.to_owned())];
     rows.push(("identification", format!("{}, alpha_A = {}", report.method, report.alpha_area_ratio)));
@@ -484,7 +474,6 @@ fn campaign_rows(campaign: &Campaign) -> Vec<(&'static str, String)> {
     rows
 }
 
-/// Soak and steps, as counted by `mapper check` and `mapper plan`.
 fn whole_duration(campaign: &Campaign, plan: &Plan) -> String {
     match campaign.zero {
         Some(soak) => format!(

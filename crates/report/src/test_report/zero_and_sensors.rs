@@ -73,7 +73,6 @@ impl Describe for [FusedChannel] {
     }
 }
 
-/// The channels for which a campaign declares several sensors.
 pub(crate) fn declared_sensors(campaign: &Campaign) -> Vec<String> {
     let several = campaign.sensors.iter().filter_map(|(channel, sensor)| {
         let fused = FusedChannel {
@@ -103,7 +102,7 @@ pub struct SurgeReport {
 /// Marks of a search for surge, lines without a mark, and the number of surge events; `truth`: with the deviations of the marks from it.
 pub(crate) fn surge_section(surge: &SurgeReport, display: &Display, truth: bool) -> Document {
     let truth = truth && surge.marks.iter().any(|scored| scored.truth_flow_corrected_kg_s.is_some());
-    let units = display.units();
+    let units = &display.units;
     let mut heads: Vec<&str> =
         vec![&units.speed, &units.flow, "+/- %", "PR", "+/-", "nearest %", "openings", "found by"];
     heads.extend(truth.then_some("error %"));

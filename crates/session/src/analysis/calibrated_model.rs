@@ -33,9 +33,6 @@ pub struct CalibratedModel<'a> {
 }
 
 /// A campaign's text with its backend replaced by a virtual lab of the identified machine.
-///
-/// # Errors
-/// [`CalibratedModelError::Effect`] if an effect is not in the library.
 pub fn calibrated_model_campaign(
     campaign_text: &str,
     calibrated: &CalibratedModel<'_>,
@@ -44,7 +41,6 @@ pub fn calibrated_model_campaign(
     Ok(with_backend(campaign_text, &backend(calibrated, catalogue)?))
 }
 
-/// The backend block.
 fn backend(calibrated: &CalibratedModel<'_>, catalogue: &[Arc<dyn Effect>]) -> Result<String, SessionError> {
     let mut effects = Map::new();
     for effect in &calibrated.found.effects {
@@ -85,7 +81,6 @@ fn backend(calibrated: &CalibratedModel<'_>, catalogue: &[Arc<dyn Effect>]) -> R
     ))
 }
 
-/// A campaign's text with its backend's block replaced.
 fn with_backend(text: &str, block: &str) -> String {
     let mut written = String::new();
     let mut inside = false;
@@ -141,9 +136,6 @@ impl SealedForecast {
     }
 
     /// Writes a new file and returns its SHA-256.
-    ///
-    /// # Errors
-    /// [`SessionError::File`] if the file exists or cannot be written.
     pub fn write(&self, path: &Path) -> Result<String, SessionError> {
         let text = json_text(self)?;
         write_new(path, text.as_bytes())?;
@@ -151,9 +143,6 @@ impl SealedForecast {
     }
 
     /// Reads a prediction and its SHA-256. `wanted`: the required hash, in digits of either case.
-    ///
-    /// # Errors
-    /// [`SessionError::File`] if it cannot be read, [`SessionError::CalibratedModelFile`] if it has another hash or is not a prediction.
     pub fn read(path: &Path, wanted: Option<&str>) -> Result<(SealedForecast, String), SessionError> {
         let text = text_of(path)?;
         let seal = sha256_hex(&text);

@@ -1,5 +1,4 @@
-//! The file of a diagnosis: what `gap diagnose` writes, and what corrections, pages, forecasts and calibrated models read instead of diagnosing
-//! again.
+//! The file of a diagnosis, which corrections, pages, forecasts and calibrated models read instead of diagnosing again.
 
 use crate::analysis::calibrated_model::{check_format, text_of, wrong};
 use crate::recording::files::{DIAGNOSIS_FORMAT, json_text, program_and_commit};
@@ -50,7 +49,6 @@ impl MadeFrom {
         })
     }
 
-    /// Whether the diagnosis of `self` is that of `wanted`.
     pub(crate) fn check(&self, wanted: &MadeFrom) -> Result<(), StoredDiagnosisError> {
         use StoredDiagnosisError as E;
         if self.program != wanted.program {
@@ -95,7 +93,6 @@ pub(crate) struct DiagnosisFile {
     pub(crate) drift: Option<DriftReport>,
 }
 
-/// Reads the file of a diagnosis; returns its text, too.
 pub(crate) fn read(path: &Path) -> Result<(DiagnosisFile, String), SessionError> {
     let text = text_of(path)?;
     if is_as_sealed(&text) == Some(false) {
@@ -108,10 +105,6 @@ pub(crate) fn read(path: &Path) -> Result<(DiagnosisFile, String), SessionError>
 }
 
 /// The machine as found, from the file of a diagnosis.
-///
-/// # Errors
-/// [`SessionError::File`] if it cannot be read, [`SessionError::StoredDiagnosis`] if it is not a diagnosis or was changed,
-/// [`SessionError::CalibratedModelFile`] if it has no machine.
 pub fn found_in(path: &Path) -> Result<Found, SessionError> {
     read(path)?.0.found.ok_or_else(|| {
         wrong(path, "it contains no identified machine; diagnose one recording without a baseline".to_owned())

@@ -24,9 +24,6 @@ pub struct Drift {
 
 impl Session<'_> {
     /// Compares recordings in the order in which they were made. They must be of the machine in `campaign`.
-    ///
-    /// # Errors
-    /// [`SessionError::Drift`] if there is nothing to compare, [`SessionError::Model`] if the campaign's map is unusable.
     pub fn drift(
         &self,
         recorded: &[Recorded],
@@ -54,8 +51,7 @@ impl Session<'_> {
         let zero = recordings.first().map_or(ZeroOutcome::NotRequested, |first| {
             ZeroOutcome::of(first, &config, campaign.zero.map(Into::into))
         });
-        // Declared offsets are kept: they are not drift. The zero determines them far better than the model, whose own errors would appear as
-        // changes.
+        // Declared offsets are kept: the zero determines them far better than the model, whose own errors would appear as changes.
         let recordings: Vec<Recording> =
             recordings.into_iter().map(|recording| zero.subtract(recording, config.clone()).0).collect();
         let fingerprints: Vec<Option<String>> = recorded.iter().map(fingerprint).collect();

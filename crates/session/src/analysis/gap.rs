@@ -48,8 +48,7 @@ pub struct Gap {
 }
 
 impl Gap {
-    /// Machine-readable output, also the content of its file: diagnosis, identified effects, drift, zero, and the fits from which others
-    /// continue.
+    /// Machine-readable output and content of its file: diagnosis, effects, drift, zero, and the fits from which others continue.
     pub fn json(&self) -> Result<Value, SessionError> {
         let Diagnosed { diagnosis, drift, zero, found, .. } = &self.diagnosed;
         let versioned = Versioned { format_version: DIAGNOSIS_FORMAT, content: diagnosis };
@@ -80,10 +79,6 @@ impl Gap {
 
 impl Session<'_> {
     /// Diagnoses one recording with candidate effects.
-    ///
-    /// # Errors
-    /// [`SessionError::OtherMachine`] if the recording is not of the campaign's machine, [`SessionError::Gap`] if required data are missing or
-    /// the nominal model cannot follow it.
     pub fn diagnose_gap(
         &self,
         recorded: &Recorded,
@@ -160,10 +155,6 @@ impl Session<'_> {
 
 impl Session<'_> {
     /// The diagnosis of a recording: from the file `stored`, from the file beside the recording if it belongs to it, or a new one.
-    ///
-    /// # Errors
-    /// [`SessionError::StoredDiagnosis`] if `stored` does not belong to this recording, campaign, effects and program; as
-    /// [`Session::diagnose_gap`].
     pub fn gap(
         &self,
         recorded: &Recorded,
@@ -207,7 +198,6 @@ impl Session<'_> {
     }
 }
 
-/// A recording with fused sensors and the declarations of its campaign.
 fn fused(
     recorded: &Recorded,
     campaign: &Campaign,
@@ -250,14 +240,12 @@ pub struct GapCorrection {
     pub gap: Gap,
     /// Before and after, point by point.
     pub map: CorrectedMap,
-    /// Identification of the corrected readings, the uncertainty of the correction in its intervals; that of the readings as recorded, what
-    /// the open causes would change in its intervals, if nothing was corrected.
+    /// Identification of the corrected readings with the uncertainty of the correction; if nothing was corrected, widened by the open causes.
     pub identified: Identified,
 }
 
 impl Session<'_> {
-    /// Identifies a diagnosed recording again without the causes found. With `directory`, the results are written there as those of an
-    /// identification.
+    /// Identifies a diagnosed recording again without the causes found. With `directory`, writes the results of an identification there.
     pub fn correct_gap(
         &self,
         gap: Gap,
@@ -329,7 +317,6 @@ const DWELL_S: f64 = 300.0;
 /// Duration of a soak, s, as in the shipped campaigns.
 const SOAK_S: f64 = 1800.0;
 
-/// All permitted experiments.
 pub(crate) fn experiments(
     registry: &Registry,
     campaign: &Campaign,
@@ -347,7 +334,6 @@ pub(crate) fn experiments(
     Ok(all)
 }
 
-/// A soak before the next run, if the campaign has none.
 fn soak(campaign: &Campaign, map: &ChannelMap) -> Option<Experiment> {
     if campaign.zero.is_some() {
         return None;

@@ -89,7 +89,6 @@ pub struct Identified {
     pub remarks: Vec<ResultRemark>,
 }
 
-/// Coefficients of the wheel at a point.
 #[derive(Debug, Serialize)]
 struct WheelStep {
     #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
@@ -109,7 +108,6 @@ impl Identified {
         value
     }
 
-    /// Content of the points file.
     pub(crate) fn points_json(&self) -> Value {
         let mut value = json!({
             "format_version": POINTS_FORMAT,
@@ -162,7 +160,6 @@ impl Identified {
         }
     }
 
-    /// The gases of compressor and turbine.
     pub(crate) fn gases(&self) -> Gases {
         Gases { compressor: self.config.air, turbine: self.config.turbine_gas }
     }
@@ -173,9 +170,6 @@ impl Identified {
     }
 
     /// Checks that there is at least one point.
-    ///
-    /// # Errors
-    /// [`SessionError::NoPoints`] with the known facts, including the `warnings` of the reader.
     pub fn has_points(&self, warnings: &[String]) -> Result<(), SessionError> {
         let why: Vec<String> =
             warnings.iter().cloned().chain(self.remarks.iter().map(Message::message)).collect();
@@ -208,19 +202,12 @@ impl Identified {
     }
 }
 
-/// The map with its gas and its definition of the efficiency.
 pub(crate) fn with_gas(map: CompressorMap, air: Air) -> CompressorMap {
     CompressorMap { efficiency: Some(air.efficiency), gas: Some(air.description()), ..map }
 }
 
 impl Session<'_> {
-    /// Identifies all steps of one recording, or of several of the same machine together. Machine, sensors and window come from the campaign of
-    /// the first, or from the channel map. The zero of the first is subtracted from all.
-    ///
-    /// # Errors
-    /// [`SessionError::NoRecording`] for an empty list, [`SessionError::MachineUnknown`] if neither campaign nor channel map defines the
-    /// machine, [`SessionError::OtherMachine`] if a recording is of another machine, [`SessionError::DifferentCampaigns`] if the recordings' own
-    /// campaigns differ, [`SessionError::Identify`] if data that the method needs are missing.
+    /// Identifies all steps of recordings of one machine together. The first gives campaign, sensors, window and zero, else the channel map.
     pub fn identify(
         &self,
         recorded: Vec<Recorded>,
@@ -388,7 +375,6 @@ fn unused_rest(recording: &Recording, config: &IdentifyConfig) -> Option<ResultR
     Some(ResultRemark::UnusedRest { start_s: rest.start_s, end_s: rest.end_s })
 }
 
-/// Metadata kept for each recording.
 struct Source {
     steps: Vec<StepMarker>,
     approaches: Option<Recording>,
@@ -417,7 +403,6 @@ fn same_campaign(recorded: &[Recorded]) -> Result<Option<&Campaign>, SessionErro
     Ok(Some(campaign))
 }
 
-/// Whether the file may contain truth: a log of another program does not.
 fn may_have_truth(recorded: &Recorded) -> bool {
     recorded.read.format.is_some()
 }

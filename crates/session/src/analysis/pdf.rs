@@ -34,8 +34,7 @@ pub enum PrintError {
     NoPdf { browser: &'static str, reason: String },
 }
 
-/// The PDF of a page. `directory` is for temporary files of the browser, which as a snap package has access only to the user's own
-/// directories.
+/// The PDF of a page. `directory`: for the browser's temporary files; as a snap package it can reach only the user's own directories.
 pub fn page_as_pdf(page: &str, directory: &Path) -> Result<Vec<u8>, PrintError> {
     let browser = BROWSERS.into_iter().find(|name| is_on_path(name)).ok_or(PrintError::NoBrowser)?;
     let failed = |source| PrintError::System(browser, source);

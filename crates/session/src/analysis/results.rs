@@ -1,5 +1,4 @@
-//! Results of a run or recording: points, map and report, as data and as files in its directory; thermal model,
-//! turbine, and pictures of h and of errors in addition to the compressor map.
+//! Results of a run or recording as data and files: points, map, report, thermal model, turbine, and pictures of h and of errors.
 
 use crate::analysis::identification::Identified;
 use crate::recording::files::{Existing, json_text, program_and_commit, write_files, write_new};
@@ -54,7 +53,6 @@ pub struct Results {
     pub compressor_map: Option<CompressorMap>,
 }
 
-/// Provenance of recordings.
 pub(crate) struct Provenance {
     campaign: Option<Campaign>,
     plan: Option<Plan>,
@@ -67,7 +65,6 @@ pub(crate) struct Provenance {
 }
 
 impl Provenance {
-    /// Provenance from the recordings themselves.
     pub(crate) fn of(recorded: &[Recorded]) -> Provenance {
         let campaign = recorded.first().and_then(|first| first.campaign.clone());
         // Recordings of one run have the same plan.
@@ -115,10 +112,8 @@ impl Provenance {
     }
 }
 
-/// One recording of a run.
 pub(crate) struct RunPart {
     pub(crate) recording: PathBuf,
-    /// Whether it has the soak.
     pub(crate) soaked: bool,
     /// Valid steps of it; `None`: all.
     pub(crate) saved: Option<BTreeSet<usize>>,
@@ -126,10 +121,6 @@ pub(crate) struct RunPart {
 
 impl Session<'_> {
     /// Reads the recording of a run, identifies, assembles, exports and reports. All files go into `directory`.
-    ///
-    /// # Errors
-    /// [`SessionError`] if the recording cannot be identified or a file cannot be written. If a map cannot be assembled or fitted, a remark says
-    /// so.
     pub(crate) fn results(
         &self,
         campaign: &Campaign,
@@ -172,11 +163,7 @@ impl Session<'_> {
         Ok(Results { unwritten, ..results })
     }
 
-    /// Identifies recordings and writes the same results as a run, points, map and report, to `directory`. Creates it if missing. Existing
-    /// results are never replaced and stop the identification.
-    ///
-    /// # Errors
-    /// As [`Session::identify`]; [`SessionError::File`] if a file exists or cannot be written.
+    /// Identifies recordings and writes the same results as a run to `directory`, created if missing. Existing results stop it.
     pub fn identify_into(
         &self,
         recorded: Vec<Recorded>,
@@ -216,9 +203,6 @@ impl Session<'_> {
     }
 
     /// The page of the run with recordings `shown`, with other runs' maps for comparison and its gap diagnosis, if any. Writes no file.
-    ///
-    /// # Errors
-    /// As [`Session::identify`].
     pub fn page(
         &self,
         shown: Vec<Recorded>,
@@ -326,7 +310,6 @@ impl Session<'_> {
     }
 }
 
-/// The files of an identification in their directory.
 struct ResultFiles<'a> {
     directory: &'a Path,
     /// The error of the first file that could not be written; none is written after it.
@@ -334,7 +317,6 @@ struct ResultFiles<'a> {
 }
 
 impl ResultFiles<'_> {
-    /// Writes a file, and returns its path.
     fn write(&mut self, name: &str, bytes: &[u8]) -> PathBuf {
         let path = self.directory.join(name);
         if self.failed.is_ok() {
@@ -344,7 +326,6 @@ impl ResultFiles<'_> {
     }
 }
 
-/// Name of a recording in comparisons: its run directory, or its file.
 fn name_of(path: &Path) -> String {
     let named = match path.file_name() {
         Some(file) if file == run_directory::RECORDING => path.parent().and_then(Path::file_name),
@@ -353,7 +334,6 @@ fn name_of(path: &Path) -> String {
     named.unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Contents of the report and the page.
 fn run_report<'a>(
     origin: &'a Provenance,
     identified: &'a Identified,
@@ -389,7 +369,6 @@ fn run_report<'a>(
     }
 }
 
-/// Source entry of a recording in a report.
 fn source(recorded: &Recorded) -> ReportSource {
     let recording = &recorded.read.recording;
     let spans = recording.series.values().filter_map(|series| series.t_s.first().zip(series.t_s.last()));
@@ -432,7 +411,6 @@ pub fn compressor_map(
     }
 }
 
-/// Writes the map in these formats.
 fn export(
     registry: &Registry,
     formats: &[String],
@@ -462,9 +440,7 @@ fn export(
 /// The written files and their contents.
 #[derive(Debug, Serialize)]
 pub struct RigFiles {
-    /// The files.
     pub files: Vec<PathBuf>,
-    /// The turbine at each point.
     pub turbine: Vec<ScoredTurbinePoint>,
     /// Parameters common to all points (joint method).
     pub thermal: Option<ThermalModel>,
@@ -472,9 +448,6 @@ pub struct RigFiles {
 
 impl Session<'_> {
     /// Identifies a recording by its campaign's method and writes the files to `out`. Creates the directory if missing.
-    ///
-    /// # Errors
-    /// [`SessionError`] if the machine is unknown, the recording cannot be identified or a file cannot be written.
     pub fn rig_files(
         &self,
         recorded: Vec<Recorded>,

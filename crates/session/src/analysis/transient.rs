@@ -16,12 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 impl Session<'_> {
-    /// Analyses a log without steps of one side of its campaign's machine, and determines which of `effects` explains it. Fits the data before
-    /// `fit_until_s` (log time, s; default: all) and predicts the later data.
-    ///
-    /// # Errors
-    /// [`SessionError::MachineUnknown`] if no campaign defines the machine, [`SessionError::OtherMachine`] if it is another,
-    /// [`SessionError::Driven`] if the log has too little data, or steps.
+    /// Determines which of `effects` explains one side in a log without steps, fitted up to `fit_until_s` (log time; default: all).
     pub fn transient(
         &self,
         recorded: &Recorded,

@@ -55,7 +55,6 @@ impl FirstRig {
 /// The files that were written.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FirstCampaign {
-    /// The campaign.
     pub campaign: PathBuf,
     /// The nominal map.
     pub map: PathBuf,
@@ -63,15 +62,10 @@ pub struct FirstCampaign {
     pub channels: Option<PathBuf>,
     /// Points of the grid.
     pub points: usize,
-    /// Sizes that the campaign assumes.
     pub assumed: Vec<AssumedSize>,
 }
 
 /// Writes the first campaign of a machine after checking it. No existing file is replaced.
-///
-/// # Errors
-/// [`SessionError::Campaign`] with the mistakes that the campaign would have, e.g. a map that does not fit the wheel;
-/// [`SessionError::FirstMap`] for a map without enough points; as [`Registry::read_map`] for one that cannot be read; [`SessionError::Exists`] and [`SessionError::File`] for its files.
 pub fn first_campaign(
     registry: &Registry,
     request: &FirstCampaignRequest,
@@ -108,7 +102,6 @@ pub fn first_campaign(
     })
 }
 
-/// Checks the campaign, and returns it or its mistakes.
 fn check_campaign(text: &str, path: &Path, map: &FirstMap) -> Result<Campaign, SessionError> {
     let files = |path: &Path| match path.file_name() {
         Some(name) if name == map.file_name.as_str() => Ok(map.text.clone()),
@@ -213,7 +206,6 @@ fn lines(speeds_rpm: &[f64]) -> String {
     speeds_rpm.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// A size of the similar machine in mm.
 fn similar_mm(request: &FirstCampaignRequest, key: &str) -> Option<f64> {
     similar_sizes(request.wheel_diameter_m).into_iter().find(|size| size.key == key).map(|size| size.value)
 }
@@ -268,7 +260,6 @@ fn geometry(request: &FirstCampaignRequest, map: &FirstMap) -> String {
     text
 }
 
-/// A template with its placeholders replaced.
 fn fill_template(template: &str, values: &[(&str, String)]) -> String {
     values
         .iter()
@@ -326,7 +317,6 @@ const LINE_STRIDE: usize = SUBDIVISIONS / 4;
 /// Points of a line in the table of a similar compressor. They are densest near surge, where the flow changes most with pressure.
 const POINTS_PER_LINE: usize = 13;
 
-/// A reference state as campaigns and channel maps have it.
 fn reference_yaml(state: ReferenceState) -> String {
     let named = NAMED_REFERENCES.iter().find(|row| row.state == state);
     let ReferenceState { t_ref_k, p_ref_pa } = state;
@@ -336,14 +326,12 @@ fn reference_yaml(state: ReferenceState) -> String {
     )
 }
 
-/// Evenly spaced speeds, rounded to 100 rpm inside the range.
 fn evenly_spaced_rpm((low_rpm, high_rpm): (f64, f64)) -> Vec<f64> {
     let step_rpm = (high_rpm - low_rpm) / (GRID_LINES - 1) as f64;
     let speed = |index: usize| (low_rpm + step_rpm * index as f64).clamp(low_rpm, high_rpm);
     (0..GRID_LINES).map(|index| (speed(index) / 100.0).round() * 100.0).collect()
 }
 
-/// The nominal map of a first campaign.
 #[derive(Debug)]
 pub(crate) struct FirstMap {
     /// Name of its file in the campaign's directory.
@@ -359,7 +347,6 @@ pub(crate) struct FirstMap {
 }
 
 impl FirstMap {
-    /// The map of a request.
     pub(crate) fn of(registry: &Registry, request: &FirstCampaignRequest) -> Result<Self, SessionError> {
         let (wheel_m, (low_m, high_m)) = (request.wheel_diameter_m, USUAL_WHEEL_DIAMETERS_M);
         if !(low_m..=high_m).contains(&wheel_m) {
@@ -372,9 +359,8 @@ impl FirstMap {
     }
 }
 
-/// The table of a nominal map: monotone cubics through the file's points, on its lines and on others between them, or the points themselves if
-/// there are too few. Linear interpolation between few points has kinks, which identification would mistake for heat transfer; a fitted surface
-/// would not pass through the points.
+/// The table of a nominal map: monotone cubics through the file's points, on its lines and others between, or the points themselves if too
+/// few. Kinks of linear interpolation would be taken for heat transfer, and a fitted surface misses the points.
 fn resample_table(
     registry: &Registry,
     path: &Path,
@@ -453,7 +439,6 @@ fn map_from_file(
     })
 }
 
-/// The map of a compressor similar to turbo_a, as a table.
 fn similar_map(request: &FirstCampaignRequest) -> FirstMap {
     let wheel_diameter_m = request.wheel_diameter_m;
     let map = ClosedFormMap { wheel_diameter_m };

@@ -19,20 +19,16 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
-/// An FMU that was written.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WrittenFmu {
-    /// The file.
     pub file: PathBuf,
     /// Source of its numbers, in one sentence.
     pub origin: String,
-    /// Shaft speed at the start, rpm.
     pub start_speed_rpm: f64,
     /// Folder of the library for this computer; `None` if the FMU contains sources only.
     pub binary: Option<String>,
 }
 
-/// A machine to be exported as an FMU.
 struct FmuExport {
     name: String,
     origin: String,
@@ -42,9 +38,6 @@ struct FmuExport {
 
 impl Session<'_> {
     /// Writes the nominal machine of a campaign.
-    ///
-    /// # Errors
-    /// [`SessionError::Fmu`] if export fails; otherwise as [`write_file`].
     pub fn nominal_fmu(
         &self,
         campaign: &Campaign,
@@ -65,11 +58,7 @@ impl Session<'_> {
         write(FmuExport { name: machine.name.clone(), origin, params, map }, campaign, compile, out, existing)
     }
 
-    /// Identifies a recording by its campaign's method and writes the identified map and, for the joint method, the thermal model. Parameters
-    /// without information in the recording keep their declared values.
-    ///
-    /// # Errors
-    /// [`SessionError`] if the machine is unknown or identification fails, [`SessionError::Fmu`] if the result is not a complete machine.
+    /// Identifies a recording and writes the identified map and, for the joint method, the thermal model. Unidentified parameters stay.
     pub fn identified_fmu(
         &self,
         recorded: Vec<Recorded>,

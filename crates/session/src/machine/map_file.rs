@@ -13,11 +13,7 @@ use std::io::{Error, ErrorKind, Read};
 use std::path::Path;
 
 impl Registry {
-    /// Reads a map file, or the map of a run directory. The extension selects the format; `user_description` is what the user states about it, or the
-    /// reference state alone. A compressed file has the extension of its format before `.gz`.
-    ///
-    /// # Errors
-    /// [`SessionError::UnknownExtension`], [`SessionError::File`], or [`SessionError::Import`] with the file's mistakes.
+    /// Reads a map file (also `.gz`), or the map of a run, by its extension; `user_description`: what the user states, e.g. the reference state.
     pub fn read_map(
         &self,
         path: &Path,
@@ -48,7 +44,6 @@ impl Registry {
             .map_err(|source| SessionError::Import(path.to_owned(), source))
     }
 
-    /// Format and content of a map file.
     fn map_bytes(&self, path: &Path) -> Result<(&'static MapFormat, Vec<u8>), SessionError> {
         if path == Path::new(STANDARD_INPUT) {
             let bytes = read_map_bytes(std::io::stdin().lock(), path)?;
@@ -105,17 +100,11 @@ impl Registry {
     }
 
     /// Checks before a run that every format in the campaign can be written.
-    ///
-    /// # Errors
-    /// [`SessionError::UnknownFormat`] with the first format that cannot be written.
     pub fn check_formats(&self, campaign: &Campaign) -> Result<(), SessionError> {
         campaign.outputs.formats.iter().try_for_each(|format| self.written_format(format.name()).map(drop))
     }
 
     /// The format of a new map file, by name or by the file's extension.
-    ///
-    /// # Errors
-    /// [`SessionError::UnknownOutputFormat`] if neither gives a format.
     pub fn format_of(&self, path: &Path, name: Option<&str>) -> Result<&'static MapFormat, SessionError> {
         let file = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         let known_format = match name {
@@ -136,7 +125,6 @@ impl Registry {
 /// The name of standard input. Source: POSIX, utility conventions.
 const STANDARD_INPUT: &str = "-";
 
-/// The unpacked content of a map file; `path` names it in messages.
 fn read_map_bytes(file: impl Read, path: &Path) -> Result<Vec<u8>, SessionError> {
     let mut bytes = Vec::new();
     // One byte above the limit shows that the file is too large.
@@ -146,7 +134,6 @@ fn read_map_bytes(file: impl Read, path: &Path) -> Result<Vec<u8>, SessionError>
     Ok(unpacked.into_owned())
 }
 
-/// Name of the format of a content without an extension.
 fn format_of_content(bytes: &[u8]) -> &'static str {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
     match text {
@@ -194,9 +181,6 @@ pub fn map_description<'a>(
 }
 
 /// Writes a map to a file.
-///
-/// # Errors
-/// [`SessionError::Export`] if the format cannot represent the map; otherwise as [`write_file`].
 pub fn write_map(
     path: &Path,
     format: &MapFormat,

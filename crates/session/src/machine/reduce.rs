@@ -24,7 +24,6 @@ use serde::Deserialize;
 use serde_json::json;
 use std::path::Path;
 
-/// The machine and the sensors with which a table was measured.
 struct TestStand {
     name: String,
     config: IdentifyConfig,
@@ -32,7 +31,6 @@ struct TestStand {
     remarks: Vec<String>,
 }
 
-/// A machine whose heat transfer is known.
 struct ThermalMachine {
     params: Params,
     tolerances: ModelTolerances,
@@ -43,14 +41,12 @@ struct ThermalMachine {
 /// Maximum size of `points.json`, bytes: a thousand points have some 10 MB.
 const POINTS_MAX_BYTES: u64 = 256 << 20;
 
-/// The required part of `points.json`.
 #[derive(Deserialize)]
 struct PointsFile {
     thermal: Option<ThermalModel>,
 }
 
 impl TestStand {
-    /// Default sensors and no thermal model, for a table without a campaign.
     fn unknown(table: &Path) -> TestStand {
         let config = IdentifyConfig {
             air: Air::new(Gas::air(), 0.0),
@@ -63,7 +59,6 @@ impl TestStand {
         TestStand { name, config, heat: None, remarks: vec![remark.to_owned()] }
     }
 
-    /// A campaign, or a run directory with its identified thermal model.
     fn read(path: &Path) -> Result<TestStand, SessionError> {
         if !path.is_dir() {
             return Ok(TestStand::of(&mapper_campaign::load(path)?, path, None));
@@ -102,8 +97,7 @@ impl TestStand {
 }
 
 impl Registry {
-    /// Makes a map from a table of steady points. `machine` is a campaign, or a run directory with an identified thermal model; `budget` is a new
-    /// file for the uncertainties by source.
+    /// Makes a map from a table of steady points. `machine`: a campaign, or a run with a thermal model; `budget`: a new file of uncertainties.
     pub fn reduce_points(
         &self,
         path: &Path,
@@ -205,7 +199,6 @@ impl Registry {
     }
 }
 
-/// The points whose housing temperature is that of a heat balance.
 fn heat_balance_remark(measured: &[MeasuredPoint], method: Method) -> Option<String> {
     let without_tc = measured.iter().filter(|point| point.tc_k.is_none()).count();
     (method == Method::Corrected && without_tc > 0).then(|| {

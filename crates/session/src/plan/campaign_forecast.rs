@@ -37,7 +37,6 @@ const MAX_SIMULATED_POINTS: usize = 200;
 /// Effort of the search for the order after a change that is tried: the expected verdicts hardly depend on the order.
 const QUICK_EFFORT: f64 = 0.05;
 
-/// Forecast of a campaign.
 #[derive(Debug)]
 pub struct CampaignForecast {
     /// Number of steps; the upper bound if the grid is too large to plan here.
@@ -57,8 +56,7 @@ pub struct CampaignForecast {
 }
 
 impl Session<'_> {
-    /// Simulates the steps of the campaign, or rehearses its script, and looks for settings that will give no result, and for
-    /// calibrations that are not valid on the day of the run.
+    /// Simulates the steps of the campaign, or rehearses its script, and looks for settings without a result and outdated calibrations.
     pub fn forecast_campaign(
         &self,
         campaign: &Campaign,
@@ -109,7 +107,6 @@ impl Session<'_> {
 }
 
 impl Session<'_> {
-    /// A guard that would end the run.
     fn guard_concern(
         &self,
         campaign: &Campaign,
@@ -128,7 +125,6 @@ impl Session<'_> {
     }
 }
 
-/// The plan of every n-th point, without its error bound.
 fn plan_of_sample(
     campaign: &Campaign,
     model: &Model,
@@ -148,7 +144,6 @@ fn plan_of_sample(
     plan_of(campaign, &PlanRequest { points: &points, ..request })
 }
 
-/// Housings that cool from the largest difference that the zero assumes.
 struct SoakingHousings<'a> {
     campaign: &'a Campaign,
     soak: Soak,
@@ -221,7 +216,6 @@ fn soak_concern(campaign: &Campaign) -> Option<Concern> {
     ))
 }
 
-/// Steps that settle too late for `window: auto`.
 fn settling_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let transient = matches!(campaign.identification.method, Method::Dynamic | Method::Joint);
     let auto = campaign.identification.window == WindowRule::Auto;
@@ -276,7 +270,6 @@ fn information_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     })
 }
 
-/// A required error that is not reached even with the longest dwell.
 fn required_error_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let Dwell::RequiredSigmaEta(required) = campaign.timing.dwell else { return None };
     let error_eta = plan.figures.rms_error_eta?;
@@ -440,7 +433,6 @@ fn sort_key(forecast: VerdictForecast) -> (usize, usize) {
     (forecast.good_low, forecast.good)
 }
 
-/// The campaign after `change`.
 fn with_change(campaign: &Campaign, change: CampaignChange) -> Campaign {
     let mut changed = campaign.clone();
     match change {

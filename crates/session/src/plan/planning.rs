@@ -29,17 +29,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The nominal model of a campaign.
-///
-/// # Errors
-/// [`SessionError::Model`] if the map cannot be read, which a checked campaign excludes.
 pub fn nominal_model(campaign: &Campaign) -> Result<Model, SessionError> {
     Ok(mapper_campaign::nominal_model(campaign)?)
 }
 
 /// The plan of a campaign with a grid, including the time of a subsequent surge search.
-///
-/// # Errors
-/// [`SessionError::Plan`] if points cannot be reached or no order is allowed.
 pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
     plan_of(campaign, &PlanInputs::of(campaign)?.request(campaign, model))
 }
@@ -60,7 +54,6 @@ pub(crate) fn order_points(campaign: &Campaign, model: &Model) -> Result<Vec<Ope
     Ok(make_plan(&request)?.steps.into_iter().map(|step| step.to).collect())
 }
 
-/// Hashes of the plan's inputs: a plan with other hashes is stale.
 pub(crate) fn hash_inputs(campaign: &Campaign, model: &Model) -> Result<PlanInputHashes, SessionError> {
     let Some(script) = &campaign.sequence else {
         return Ok(mapper_planner::hash_inputs(&PlanInputs::of(campaign)?.request(campaign, model)));
@@ -79,9 +72,6 @@ pub struct PlanInputs {
 
 impl PlanInputs {
     /// Inputs of a campaign.
-    ///
-    /// # Errors
-    /// [`SessionError::Json`] if the campaign cannot be written as JSON.
     pub fn of(campaign: &Campaign) -> Result<Self, SessionError> {
         Ok(PlanInputs { canonical: serde_json::to_string(campaign)?, method: predicted_method(campaign) })
     }
@@ -170,7 +160,6 @@ fn zero_remark(campaign: &Campaign) -> Option<PlanRemark> {
     })
 }
 
-/// Which steps a method identifies together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Scope {
     /// Each step separately (`dynamic`).
@@ -181,7 +170,6 @@ pub(crate) enum Scope {
     Settled,
 }
 
-/// The campaign's method, after its zero.
 #[derive(Debug)]
 pub(crate) struct Forecaster {
     config: IdentifyConfig,
@@ -189,7 +177,6 @@ pub(crate) struct Forecaster {
 }
 
 impl Forecaster {
-    /// The method under `config`.
     pub(crate) fn of(config: IdentifyConfig, scope: Scope) -> Self {
         // A forecast uses total pressures.
         let total = PressureTap::Total;
@@ -217,8 +204,7 @@ impl PredictedMethod for Forecaster {
     }
 }
 
-/// Setpoints and predicted readings of the nominal machine at a point near or beyond its surge line. `None` if P3 or T2 would exceed the
-/// campaign's limits.
+/// Setpoints and predicted readings of the nominal machine near or beyond its surge line. `None` beyond the limits of P3 or T2.
 pub fn hold_near_surge(campaign: &Campaign, model: &Model, point: OperatingPoint) -> Option<HoldConditions> {
     let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
     let steady = hold_speed(model, point.speed_rpm, &boundary, campaign.follow_outlet).ok()?;
@@ -260,7 +246,6 @@ pub(crate) fn add_surge_search(campaign: &Campaign, model: &Model, plan: &mut Pl
     });
 }
 
-/// Finds the surge marks in the approaches of a recording.
 pub(crate) fn find_surge_marks(
     approaches: &Recording,
     campaign: Option<&Campaign>,
@@ -287,10 +272,6 @@ const MAX_RUN_S: f64 = 14.0 * 86_400.0;
 const ROUNDING_RATIO: f64 = 1e-9;
 
 /// Reads a plan from a file and rejects it if its inputs differ from `now`.
-///
-/// # Errors
-/// [`SessionError::StalePlan`] with the differences; [`SessionError::NotAPlan`] and [`SessionError::File`] if the file does not contain a plan;
-/// [`SessionError::InvalidPlan`] if the plan violates a limit.
 pub fn stored_plan(path: &Path, now: &PlanInputHashes, campaign: &Campaign) -> Result<Plan, SessionError> {
     let bytes = read_at_most(path, MAX_FILE_BYTES)?;
     let wrong = |why: String| SessionError::InvalidPlan { path: path.to_owned(), why };
@@ -375,7 +356,6 @@ fn step_violation(place: usize, step: &PlanStep, campaign: &Campaign) -> Option<
     from.then(|| "starts from a point outside the limits".to_owned())
 }
 
-/// The steps of a script, each identified as soon as it ends.
 pub(crate) struct ScriptedSteps {
     script: SequenceRunner,
     config: IdentifyConfig,
@@ -461,7 +441,6 @@ impl StepSource for ScriptedSteps {
         Ok(())
     }
 
-    /// Reports to the script that a result is missing.
     fn after_skipped_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let Some(step) = self.current_step.take() else { return Ok(()) };
         self.finished = Some(result_of(&step, marker, None));
@@ -496,7 +475,6 @@ fn with_steps(mut plan: Plan, steps: Vec<PlanStep>) -> Plan {
     plan
 }
 
-/// Campaign data available to a script.
 fn request(campaign: &Campaign, model: &Model, accepts: Option<SetpointRanges>) -> SequenceRequest {
     let (planned, machine) = (campaign.clone(), model.clone());
     SequenceRequest {

@@ -29,9 +29,6 @@ pub struct Rehearsal {
 }
 
 /// Runs the script on the virtual lab of the nominal machine, without a recording.
-///
-/// # Errors
-/// [`SessionError`] if the script has a mistake, makes no step, or a guard trips.
 pub fn rehearse(
     session: &Session<'_>,
     campaign: &Campaign,
@@ -70,9 +67,6 @@ pub fn rehearse(
 impl Session<'_> {
     /// Rehearses the jumps of a plan on the virtual lab of the nominal machine, and returns the first guard trip that would end the run: the
     /// settings of the lab may move P3 and valve otherwise than declared. `None` too if the rehearsal fails, since it says nothing about the campaign then.
-    ///
-    /// # Errors
-    /// [`SessionError`] if it is interrupted, or the registry has no virtual lab.
     pub fn forecast_guard_trip(
         &self,
         campaign: &Campaign,
@@ -90,7 +84,6 @@ impl Session<'_> {
         Ok(Some(PlanRemark::GuardTrip { guard: trip.guard, to, reason: trip.reason, highest_speed_rpm }))
     }
 
-    /// Runs the first seconds of each step.
     fn rehearse_jumps(
         &self,
         campaign: &Campaign,
@@ -182,7 +175,6 @@ impl StepSource for RehearsalSteps {
     }
 }
 
-/// A plan with hashes and times but without the script's steps.
 fn base_plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
     // The planner plans one point only; the script selects the others.
     let points = campaign.points.iter().copied().take(1).collect();

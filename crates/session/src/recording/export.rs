@@ -37,9 +37,6 @@ pub struct Converted {
 }
 
 /// Reads a recording, a run or a log through a channel map, and writes it to `out`, whose extension gives the format.
-///
-/// # Errors
-/// [`SessionError`] if the source cannot be read, the extension is none of a format, or the file exists and is not to be replaced.
 pub fn convert_recording(
     registry: &Registry,
     source: &Path,
@@ -78,7 +75,6 @@ pub fn convert_recording(
     })
 }
 
-/// All times at which a channel has a sample, in order.
 fn times_s(recording: &Recording) -> Vec<f64> {
     let all = recording.series.values().chain(recording.elements.values());
     let mut times_s: Vec<f64> = all.flat_map(|series| series.t_s.iter().copied()).collect();
@@ -100,7 +96,6 @@ fn values_at(series: &Series, times_s: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// One column per channel and sensor, and the number of the step.
 fn table(recording: &Recording, times_s: &[f64]) -> SampleTable {
     let column = |name: String, unit: &str, series: &Series| SampleColumn {
         name,
@@ -127,7 +122,6 @@ fn table(recording: &Recording, times_s: &[f64]) -> SampleTable {
     SampleTable { times_s: times_s.to_vec(), columns }
 }
 
-/// Writes a recording of this program, without a campaign.
 fn write_recording(
     read: &ReadReport,
     (source, times_s): (&Path, &[f64]),
@@ -169,7 +163,6 @@ fn write_recording(
     Ok(writer.finish()?)
 }
 
-/// All samples at some consecutive times.
 fn batch(recording: &Recording, times_s: &[f64], first: usize) -> SampleBatch {
     let columns = recording.series.iter();
     let elements = recording.elements.iter();

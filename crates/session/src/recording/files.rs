@@ -25,9 +25,6 @@ impl Existing {
 }
 
 /// Writes a file.
-///
-/// # Errors
-/// [`SessionError::Exists`] if it exists and must be kept, [`SessionError::File`] if it cannot be written.
 pub fn write_file(path: &Path, bytes: &[u8], existing: Existing) -> Result<(), SessionError> {
     if existing == Existing::Kept || !path.exists() {
         return write_new(path, bytes);
@@ -76,8 +73,7 @@ pub struct Versioned<T> {
     pub content: T,
 }
 
-/// Writes a file under a temporary name in the same directory, so that the final name never belongs to an incomplete file, even if the disk is
-/// full.
+/// Writes a file under a temporary name in the same directory, so that the final name never belongs to an incomplete file.
 fn write_temporary(path: &Path, bytes: &[u8]) -> std::io::Result<NamedTempFile> {
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
@@ -91,9 +87,6 @@ fn write_temporary(path: &Path, bytes: &[u8]) -> std::io::Result<NamedTempFile> 
 }
 
 /// Writes a new file.
-///
-/// # Errors
-/// [`SessionError::Exists`] if it already exists, [`SessionError::File`] if it cannot be written.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
     write_temporary(path, bytes)
         .and_then(|file| file.persist_noclobber(path).map_err(|error| error.error))
@@ -102,9 +95,6 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
 }
 
 /// Returns indented JSON with a final line break.
-///
-/// # Errors
-/// [`SessionError::Json`] if the value cannot be written as JSON.
 pub fn json_text(value: &impl Serialize) -> Result<String, SessionError> {
     Ok(serde_json::to_string_pretty(value)? + "\n")
 }

@@ -46,7 +46,6 @@ pub(crate) fn fuse_sensors(
     FusedRecordings { config: of_first(&recordings, config), recordings, channels }
 }
 
-/// With the humidity that the first recording measured.
 fn of_first(recordings: &[Recording], config: IdentifyConfig) -> IdentifyConfig {
     recordings.first().map_or(config.clone(), |first| with_measured_humidity(first, &config))
 }
@@ -70,13 +69,11 @@ impl FusedRecordings {
     }
 }
 
-/// Gives a nominal model the probe and the air of a recording.
 pub(crate) fn take_air_and_probe(model: &mut Model, config: &IdentifyConfig) {
     model.params.t2_probe_diameter_m = config.probe_diameter_m;
     model.params.compressor.humidity_kg_kg = config.air.humidity_kg_kg();
 }
 
-/// The recordings of several runs as stored.
 pub(crate) fn recordings(recorded: &[Recorded]) -> Vec<Recording> {
     recorded.iter().map(|recorded| recorded.read.recording.clone()).collect()
 }
@@ -96,8 +93,7 @@ fn copy_uncertainty(config: &mut IdentifyConfig, fused: &FusedChannel, campaign:
     }
 }
 
-/// Declared uncertainty of each sensor in channels with several sensors. The channel map takes precedence; the campaign applies if its number of
-/// sensors matches. A declaration for a channel as a whole applies to each of its sensors.
+/// Declared uncertainty of each of several sensors: by the channel map, else by a campaign with as many; one for the channel holds for all.
 fn declared(
     recording: &Recording,
     campaign: Option<&Campaign>,

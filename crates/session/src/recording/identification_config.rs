@@ -17,7 +17,6 @@ use mapper_physics::rig::sensor_fault::ExactReadings;
 use mapper_recording::{AmbientPressure, ChannelMap, MachineConstants};
 use std::collections::BTreeMap;
 
-/// Readings that a zero is expected to have.
 pub(crate) fn expected_rest(campaign: &Campaign) -> ExactReadings {
     ExactReadings { pressure_pa: campaign.boundary.p1_pa, temperature_k: campaign.boundary.t1_k }
 }
@@ -108,7 +107,6 @@ const THERMOMETER_K: f64 = 0.2;
 /// distribution.
 const THERMOCOUPLE_K: f64 = 1.4;
 
-/// Sensors of a table of points that come without a declaration.
 pub(crate) fn assumed_sensors() -> BTreeMap<Channel, DeclaredUncertainty> {
     let offset = |offset_sigma| DeclaredUncertainty { offset_sigma, ..DeclaredUncertainty::default() };
     let gain = |gain_sigma_ratio| DeclaredUncertainty { gain_sigma_ratio, ..DeclaredUncertainty::default() };
@@ -127,7 +125,6 @@ pub(crate) fn assumed_sensors() -> BTreeMap<Channel, DeclaredUncertainty> {
     ])
 }
 
-/// Adds the gain of the sensor's kind if none is declared.
 fn add_default_gain(channel: Channel, declared: &mut DeclaredUncertainty) {
     if declared.gain_sigma_ratio == 0.0 {
         declared.gain_sigma_ratio = default_gain_sigma_ratio(channel);

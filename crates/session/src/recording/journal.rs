@@ -1,5 +1,4 @@
-//! The journal of a run: its identity and the steps safely recorded. Each entry is one line of JSON, so that a torn last line leaves all earlier
-//! lines valid.
+//! The journal of a run: its identity and the steps safely recorded, a line of JSON each: a torn last line leaves the others valid.
 
 use crate::SessionError;
 use mapper_campaign::Campaign;
@@ -16,7 +15,6 @@ const MAX_JOURNAL_BYTES: u64 = 16 << 20;
 /// Properties that must be unchanged to resume a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
-    /// Name of the machine.
     pub machine: String,
     pub serial_number: Option<String>,
     /// Hash of the campaign.
@@ -41,9 +39,6 @@ pub fn rig_sha256(rig: &RigDescription) -> Result<String, SessionError> {
 
 impl Identity {
     /// Identity of a run.
-    ///
-    /// # Errors
-    /// [`SessionError::Json`] if the plan cannot be written as JSON.
     pub fn of(campaign: &Campaign, plan: &Plan, rig: &RigDescription) -> Result<Self, SessionError> {
         let hash = |text: &str| mapper_planner::sha256_hex(text);
         let behind = rig.exclusive.as_deref().map(|name| format!(" ({name})")).unwrap_or_default();
@@ -84,7 +79,6 @@ impl Identity {
     }
 }
 
-/// Whether two hashes differ; an unknown one does not.
 pub(crate) fn both_known_and_differ(then: Option<&str>, now: Option<&str>) -> bool {
     then.zip(now).is_some_and(|(then, now)| then != now)
 }
@@ -95,16 +89,12 @@ pub(crate) fn both_known_and_differ(then: Option<&str>, now: Option<&str>) -> bo
 pub enum Entry {
     /// A part of the run begins, with a new recording.
     Part {
-        /// Identity of the run.
         identity: Identity,
-        /// File name of its recording in the run directory.
         recording: String,
     },
-    /// The soak is complete and recorded.
     Soaked,
     /// A step is complete and recorded. Holds its index in the plan, stored as the step number.
     StepSaved(#[serde(with = "mapper_core::test_plan::step_number")] usize),
-    /// The run has ended.
     Ended(RunEnding),
 }
 
@@ -117,10 +107,7 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal of a run to append, and locks it until it is dropped, so that only one process resumes the run.
-    ///
-    /// # Errors
-    /// The system's error; of kind `WouldBlock` if another runner has the journal.
+    /// Opens and locks the journal of a run to append, so that one process resumes it. `WouldBlock`: another runner has it.
     pub fn open(path: &Path, synced: bool) -> std::io::Result<Self> {
         let mut file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
         match file.try_lock() {
@@ -142,9 +129,6 @@ impl Journal {
     }
 
     /// Writes one line.
-    ///
-    /// # Errors
-    /// The system's error.
     pub fn write(&mut self, entry: &Entry) -> std::io::Result<()> {
         let mut line = serde_json::to_vec(entry)?;
         line.push(b'\n');
@@ -175,7 +159,6 @@ pub struct JournalPart {
 }
 
 impl JournalPart {
-    /// Whether no recording contains a step of this part, or its soak.
     pub(crate) fn has_losses(&self) -> bool {
         self.lost_soak || self.lost.iter().any(|index| *index < StepMarker::FIRST_REPEAT_INDEX)
     }
@@ -187,9 +170,6 @@ impl JournalPart {
 }
 
 /// Reads the parts of a run. Unreadable lines are skipped: a step not known to be saved is run again.
-///
-/// # Errors
-/// The system's error.
 pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
     let mut bytes = Vec::new();
     mapper_yaml::open_file(path)?.take(MAX_JOURNAL_BYTES).read_to_end(&mut bytes)?;

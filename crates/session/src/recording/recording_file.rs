@@ -27,12 +27,7 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// Reads a run directory, an MCAP file or a log of any format of the registry. The machine comes from the first of these: the given
-    /// campaign, the `machine` of the channel map, the campaign attached to the recording.
-    ///
-    /// # Errors
-    /// [`SessionError::Record`] if the recording cannot be read, [`SessionError::Campaign`] if the attached campaign has mistakes,
-    /// [`SessionError::SeveralRecordings`] if a run has several.
+    /// Reads a run directory, MCAP file or log. The machine: by the campaign given, else the channel map, else the campaign attached.
     pub fn read(
         registry: &Registry,
         path: &Path,
@@ -64,7 +59,6 @@ impl Recorded {
         Recorded::described(name.to_owned(), read, map, given)
     }
 
-    /// The contents with the campaign that describes the machine.
     fn described(
         file: PathBuf,
         read: ReadReport,
@@ -79,8 +73,7 @@ impl Recorded {
         Ok(Recorded::of(file, read, campaign))
     }
 
-    /// Same as [`read`](Recorded::read), for all recordings of a run directory. A resumed run has several; only the valid steps of each are
-    /// returned.
+    /// As [`read`](Recorded::read), for all recordings of a run directory, each with its valid steps: a resumed run has several.
     pub fn read_run(
         registry: &Registry,
         path: &Path,
@@ -107,7 +100,6 @@ impl Recorded {
         Ok(merge_parts(with_parts))
     }
 
-    /// The contents of a file, with the surge approaches separated.
     pub(crate) fn of(path: PathBuf, mut read: ReadReport, campaign: Option<Campaign>) -> Recorded {
         let approaches = read.recording.split_off_approaches();
         Recorded { path, read, campaign, approaches }
@@ -119,8 +111,7 @@ impl Recorded {
     }
 }
 
-/// The recordings of a run, each with its valid steps; of the last part, every complete step is valid. Parts without a step or soak are omitted.
-/// So are parts with exactly the data of a later part, which only a simulated rig produces.
+/// The recordings of a run, each with its valid steps (of the last all complete ones); no empty parts, no repeated data of a simulator.
 pub(crate) fn merge_parts<'a>(
     parts: impl ExactSizeIterator<Item = ((bool, Option<&'a BTreeSet<usize>>), Recorded)>,
 ) -> Vec<Recorded> {
@@ -142,10 +133,6 @@ pub(crate) fn merge_parts<'a>(
     all
 }
 
-/// The journal of a run that was resumed; `None` for anything else.
-///
-/// # Errors
-/// [`SessionError::SeveralRecordings`] if the run has a second recording, and its journal cannot be read.
 fn resumed_run(path: &Path) -> Result<Option<InterruptedRun>, SessionError> {
     match InterruptedRun::read(path) {
         Ok(interrupted) => Ok(Some(interrupted).filter(|interrupted| interrupted.parts.len() > 1)),
@@ -156,8 +143,7 @@ fn resumed_run(path: &Path) -> Result<Option<InterruptedRun>, SessionError> {
     }
 }
 
-/// Rejects a recording that was given twice, even if it was cut, renamed or exported again: its noise would count as new evidence. The parts of
-/// a run may share samples only if they come from a simulator without noise.
+/// Rejects a recording given twice, even renamed or cut: its noise is no new evidence. Parts of a run may share noiseless samples.
 pub fn check_all_distinct<'a>(recorded: impl IntoIterator<Item = &'a Recorded>) -> Result<(), SessionError> {
     let recorded: Vec<&Recorded> = recorded.into_iter().collect();
     if recorded.len() < 2 {
@@ -196,7 +182,6 @@ fn distinct_rows(recording: &Recording) -> HashSet<[i64; 4]> {
     times.flatten().map(|t_s| row(*t_s)).collect()
 }
 
-/// The campaign attached to a recording; `None` if there is none.
 pub(crate) fn attached_campaign(read: &ReadReport, file: &Path) -> Result<Option<Campaign>, SessionError> {
     let Some(text) = &read.campaign_text else { return Ok(None) };
     let origin = file.with_file_name(run_directory::CAMPAIGN);
@@ -215,17 +200,10 @@ fn read_next_to(path: &Path) -> std::io::Result<String> {
 }
 
 /// Reads a channel map from a file.
-///
-/// # Errors
-/// [`SessionError::ChannelMap`] with the read error or the file's mistakes.
 pub fn channel_map(file: &Path) -> Result<ChannelMap, SessionError> {
     Ok(ChannelMap::load(file)?)
 }
 
-/// Rejects a recording of another machine than the campaign's.
-///
-/// # Errors
-/// [`OtherMachine`], by the rule of [`mapper_observe::same_machine`].
 pub(crate) fn check_machine(recorded: &Recorded, campaign: &Campaign) -> Result<(), OtherMachine> {
     let machine = &campaign.machine;
     mapper_observe::same_machine(&recorded.read.metadata, &machine.name, machine.serial_number.as_deref())
@@ -236,7 +214,6 @@ pub(crate) fn check_machine(recorded: &Recorded, campaign: &Campaign) -> Result<
 pub struct LogInspection {
     /// The file.
     pub path: PathBuf,
-    /// Name of its format.
     pub format: &'static str,
     /// Groups, columns and detected layout.
     pub layout: Layout,
@@ -248,12 +225,7 @@ pub struct LogInspection {
     pub options: Vec<(String, String)>,
 }
 
-/// Reads a log once and proposes a channel map; `options` are keys and values of the log reader, `machine` is the campaign of the machine,
-/// whose map shows the unit of a flow.
-///
-/// # Errors
-/// [`SessionError::Campaign`] for a wrong campaign, [`SessionError::LogOption`] for a wrong key or value, [`SessionError::Log`] if the file
-/// cannot be read as a log.
+/// Reads a log once and proposes a channel map; `options`: of the log reader, `machine`: its campaign, whose map shows the unit of a flow.
 pub fn inspect_log(
     registry: &Registry,
     path: &Path,

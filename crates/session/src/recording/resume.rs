@@ -63,8 +63,7 @@ impl InterruptedRun {
         Ok(run)
     }
 
-    /// Removes steps that a later part repeated, those after a lost step, and the last line of the surge search. The search depends on its
-    /// preceding data and restarts that line.
+    /// Removes repeated steps, those after a lost step, and the last line of the surge search, which restarts because it depends on its data.
     pub(crate) fn discard_superseded_steps(&mut self, campaign: &Campaign) -> Result<(), SessionError> {
         if !depends_on_readings(campaign) {
             return Ok(());
@@ -99,7 +98,6 @@ impl InterruptedRun {
         Ok(())
     }
 
-    /// Steps that are in one of the recordings, by index in the plan.
     pub(crate) fn saved(&self) -> BTreeSet<usize> {
         self.parts.iter().flat_map(|part| part.saved.iter().copied()).collect()
     }
@@ -110,9 +108,6 @@ impl InterruptedRun {
     }
 
     /// Rejects a run with another identity, or one with no remaining work.
-    ///
-    /// # Errors
-    /// [`SessionError::NotResumable`] with the differences or the reason.
     pub(crate) fn check(
         &mut self,
         campaign: &Campaign,
@@ -173,7 +168,6 @@ impl InterruptedRun {
         plan.steps.iter().all(|step| saved.contains(&step.index))
     }
 
-    /// One sentence on the repeated work and its reason.
     pub(crate) fn summary(&self, campaign: &Campaign, plan: &Plan, saved: &BTreeSet<usize>) -> String {
         let soak = match (campaign.zero.is_some(), self.has_soak()) {
             (false, _) => "the campaign has no soak",

@@ -29,12 +29,10 @@ pub const REPORT: &str = "report.md";
 /// The extended report as a page for a browser.
 pub const PAGE: &str = "report.html";
 
-/// The recording of a part of a resumed run, from 2.
 pub(crate) fn further_recording(part: usize) -> String {
     format!("recording-{part}.mcap")
 }
 
-/// Whether a file is one of a run's recordings, by its name.
 pub(crate) fn is_recording(path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let number = name.strip_prefix("recording-").and_then(|rest| rest.strip_suffix(".mcap"));
@@ -49,9 +47,6 @@ pub(crate) fn is_result(name: &str) -> bool {
 }
 
 /// Creates `<parent>/<campaign>-<time>`, with suffix `-2`, `-3`, ... if it already exists.
-///
-/// # Errors
-/// [`SessionError::File`] if a directory cannot be created, [`SessionError::TooManyRuns`] after 999 of the same name.
 pub fn create(parent: &Path, campaign: &str, time: &str) -> Result<PathBuf, SessionError> {
     std::fs::create_dir_all(parent).map_err(|error| match error.kind() {
         // A file, or a link to a place that does not exist.

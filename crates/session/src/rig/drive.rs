@@ -14,11 +14,8 @@ use mapper_runner::{
 };
 use std::sync::atomic::AtomicBool;
 
-/// Runs the steps on the rig, after the soak if the campaign has one. The campaign defines guards and speed loop; `model` is the nominal
-/// machine, which tunes the loop.
-///
-/// # Errors
-/// [`RunError`] if rig, steps or observer fail; the rig is safe then.
+/// Runs the steps on the rig, after the soak if the campaign has one; `model`, the nominal machine, tunes the speed loop.
+/// The rig is safe after an error.
 pub fn drive(
     campaign: &Campaign,
     model: &Model,
@@ -144,7 +141,6 @@ fn reading_bounds(campaign: &Campaign) -> ReadingBounds {
     }
 }
 
-/// The speed loop that the campaign asks for.
 fn speed_control<'a>(campaign: &'a Campaign, model: &'a Model) -> Option<SpeedControl<'a>> {
     let sensor = campaign.sensors.get(&Channel::P3).map(|sensor| sensor.declared).unwrap_or_default();
     let high_pa = campaign.limits.p3_max_pa;
@@ -172,8 +168,7 @@ pub fn soak_s(campaign: &Campaign) -> f64 {
     campaign.zero.map_or(0.0, |zero| zero.duration_s)
 }
 
-/// Makes the guards for a run of this campaign on this rig. A default guard is omitted if the rig does not deliver its signal. Declared and
-/// required guards are always included; they trip if their signal is missing.
+/// Makes the guards of a run: default ones only if the rig delivers their signal; declared and required ones always; these trip without it.
 pub fn make_guards(
     campaign: &Campaign,
     rig: &RigDescription,
@@ -224,9 +219,6 @@ pub(crate) fn max_age_s(campaign: &Campaign, source: &RigDescription) -> f64 {
 }
 
 /// Checks that every guard the rig requires is present, and that its channel is delivered.
-///
-/// # Errors
-/// [`SessionError::MissingGuards`] with all missing guards, [`SessionError::GuardWithoutChannel`] with the channels.
 pub fn check_guards(campaign: &Campaign, rig: &RigDescription) -> Result<(), SessionError> {
     let set = campaign.guard_set();
     let missing: Vec<GuardName> =

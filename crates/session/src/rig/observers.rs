@@ -38,7 +38,6 @@ impl Recorder {
         }
     }
 
-    /// Writes those pending entries to the journal whose data are flushed.
     fn write_flushed_entries(&mut self) -> Result<(), ObserverError> {
         let saved_s = self.writer.saved_until_s();
         if let Some(file) = &self.sync_handle {
@@ -52,7 +51,6 @@ impl Recorder {
         Ok(())
     }
 
-    /// Writes the end of the run into the journal.
     fn write_end(journal: Option<Journal>, pending: Vec<(Entry, Option<f64>)>, end: RunEnding) {
         let Some(mut journal) = journal else { return };
         let entries = pending.into_iter().map(|(entry, _)| entry).chain([Entry::Ended(end)]);
@@ -64,7 +62,6 @@ impl Recorder {
         }
     }
 
-    /// Closes the file, and writes how the run ended into the journal.
     pub(crate) fn finish(self, end: RunEnding) -> Result<(), RecordError> {
         self.writer.finish()?;
         Recorder::write_end(self.journal, self.pending, end);
@@ -105,7 +102,6 @@ impl RunObserver for Recorder {
     }
 }
 
-/// Forwards the runner's events as session events.
 pub(crate) struct EventForwarder<'a> {
     pub on_event: OnEvent<'a>,
     /// Planned steps.
@@ -162,10 +158,8 @@ impl RunObserver for EventForwarder<'_> {
 /// Queue length: some seconds of samples. If the queue is full the run waits, so no data are lost.
 const MAX_WAITING_CALLS: usize = 32;
 
-/// A call of an observer, to be made on its thread.
 type Call<'scope, O> = Box<dyn FnOnce(&mut O) -> Result<(), ObserverError> + Send + 'scope>;
 
-/// The observer accepts no more messages.
 #[derive(Debug, thiserror::Error)]
 #[error("recording stopped after an error that was reported before")]
 struct ObserverStopped;
@@ -178,7 +172,6 @@ pub(crate) struct ThreadedObserver<'scope, O> {
 }
 
 impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
-    /// Starts the thread.
     pub(crate) fn start<'env>(scope: &'scope Scope<'scope, 'env>, mut observer: O) -> Self {
         let (to_thread, calls) = sync_channel::<Call<'scope, O>>(MAX_WAITING_CALLS);
         let (fail, failed) = channel();
@@ -252,7 +245,6 @@ pub(crate) struct StepEstimator {
 }
 
 impl StepEstimator {
-    /// Starts the thread, which ends when this value is dropped.
     pub(crate) fn start<'scope, 'env>(
         scope: &'scope Scope<'scope, 'env>,
         config: IdentifyConfig,

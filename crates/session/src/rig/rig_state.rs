@@ -25,8 +25,7 @@ const SYSTEM_DIRECTORY: &str = "/var/lib/mapper";
 /// Directory that every user may create. It survives restarts.
 const FALLBACK_DIRECTORY: &str = "/var/tmp/mapper";
 
-/// The directory for locks and lockouts. All users of a computer share it, because several of them may drive one rig. It is `/var/lib/mapper` if
-/// that exists, otherwise `/var/tmp/mapper`, or the directory for temporary files on systems without these.
+/// The directory for locks and lockouts, shared by all users: `/var/lib/mapper` if it exists, else `/var/tmp/mapper`, or a temporary one.
 pub fn shared_state_directory() -> PathBuf {
     let shared = Path::new(FALLBACK_DIRECTORY);
     match Path::new(SYSTEM_DIRECTORY) {
@@ -76,7 +75,6 @@ struct Entry<T> {
 #[derive(Debug, Clone)]
 pub struct RigStates {
     directory: PathBuf,
-    /// Whether every user of the machine may write to them.
     shared: bool,
 }
 
@@ -102,8 +100,7 @@ pub struct RigStatus {
 }
 
 impl RigStates {
-    /// States in a directory, which is created on demand. Other users may write to it only if it is the [`shared_state_directory`]; any other
-    /// directory may also contain keys and sockets.
+    /// States in a directory, created on demand. Others may write only to the [`shared_state_directory`]: any other may contain keys.
     pub fn new(directory: &Path) -> Self {
         RigStates { directory: directory.to_owned(), shared: directory == shared_state_directory() }
     }
@@ -114,8 +111,7 @@ impl RigStates {
         self.directory.join(format!("rig-{}~{hash}.{extension}", readable(rig)))
     }
 
-    /// Why a file may mean this rig or another one: its name is shared by several rigs, or it contains another rig's name. Such a file locks the
-    /// rig out, and no acknowledgement removes it.
+    /// Why a file may mean this rig or another one, by its name or content. It locks the rig out, and no acknowledgement removes it.
     fn doubtful_file(&self, rig: &str) -> Option<String> {
         let doubt = |path: &Path, why: &str| {
             let path = path.display();
@@ -149,10 +145,6 @@ impl RigStates {
     }
 
     /// Locks a rig. An abandoned run is not an obstacle if it is the run in `resumes`.
-    ///
-    /// # Errors
-    /// [`SessionError::RigInUse`], [`SessionError::RigAbandoned`] and [`SessionError::RigLockedOut`] with the known facts; [`SessionError::File`]
-    /// for system errors.
     pub fn claim(&self, rig: &str, resumes: Option<&Path>) -> Result<Claim, SessionError> {
         let (mut lock, path) = self.open(rig)?;
         try_lock(rig, &mut lock, &path)?;
@@ -254,17 +246,12 @@ impl RigStates {
         statuses.filter(|status| !is_address(status)).chain(nameless).collect()
     }
 
-    /// Rigs that wait for acknowledgement.
     fn unacknowledged_rigs(&self) -> Vec<String> {
         let waits = |status: &RigStatus| status.latch.is_some() || (status.owner.is_some() && !status.in_use);
         self.list().into_iter().filter(waits).map(|status| status.rig).collect()
     }
 
     /// Acknowledges that the rig was inspected, so that the next run may begin.
-    ///
-    /// # Errors
-    /// [`SessionError::RigInUse`] during a run; [`SessionError::NothingToAcknowledge`] if the rig needs no acknowledgement;
-    /// [`SessionError::RigFileDoubtful`] if its file may mean another rig; [`SessionError::File`] for system errors.
     pub fn acknowledge(&self, rig: &str) -> Result<RigStatus, SessionError> {
         if let Some(reason) = self.doubtful_file(rig) {
             return Err(SessionError::RigFileDoubtful { rig: rig.to_owned(), reason });
@@ -296,7 +283,6 @@ impl RigStates {
 }
 
 impl Claim {
-    /// Records the owner of the rig.
     pub fn record_owner(&mut self, owner: &Owner) -> Result<(), SessionError> {
         self.write(Some(owner))
     }
@@ -331,14 +317,12 @@ fn readable(rig: &str) -> String {
     rig.chars().take(100).map(file_name_char).collect()
 }
 
-/// The rig that a lock or lockout file names.
 fn named_rig(path: &Path) -> Option<String> {
     let mut file = open_plain(path).ok()?;
     let entry: Entry<serde_json::Value> = serde_json::from_str(&read_text(&mut file).ok()?).ok()?;
     Some(entry.rig)
 }
 
-/// Whether two paths refer to the same directory.
 fn is_same_directory(a: &Path, b: &Path) -> bool {
     let resolved = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     resolved(a) == resolved(b)
@@ -373,8 +357,7 @@ fn read_text(file: &mut File) -> io::Result<String> {
     Ok(text)
 }
 
-/// Opens a file for reading and writing. It must be a plain file with one name, because a link that another user placed there could make a run
-/// overwrite the file it points to.
+/// Opens a plain file with one name for reading and writing: a link of another user could make a run overwrite its target.
 fn open_plain(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.read(true).write(true);
@@ -406,8 +389,7 @@ fn create_new(path: &Path, shared: bool) -> io::Result<File> {
     Ok(file)
 }
 
-/// Creates a directory. If it is shared, every user may create files in it and remove those of others, because a user who has inspected the rig
-/// may acknowledge a lockout.
+/// Creates a directory. If it is shared, every user may remove files of others, as the user who has inspected the rig must.
 fn make_directory(path: &Path, shared: bool) -> io::Result<()> {
     if path.is_dir() {
         return Ok(());
@@ -432,13 +414,10 @@ fn share(_: &Path, _: u32) -> io::Result<()> {
     Ok(())
 }
 
-/// The locks of a run.
 #[derive(Default)]
 pub(crate) struct RigLease {
-    /// The rig, if it can have only one user.
     rig: Option<Claim>,
-    /// Auxiliary instruments and the rig's address, one lock each. They have no recorded owner: only the rig itself needs an acknowledgement
-    /// after an abandoned run.
+    /// Auxiliary instruments and the rig's address, one lock each, without an owner: only the rig itself needs an acknowledgement.
     instruments: Vec<Claim>,
 }
 
@@ -456,7 +435,6 @@ impl RigLease {
         Ok(RigLease { rig, instruments })
     }
 
-    /// Records the owner of the rig.
     pub(crate) fn record_owner(&mut self, run: &Path, started: &str) -> Result<(), SessionError> {
         self.rig.as_mut().map_or(Ok(()), |claim| claim.record_owner(&owner(run, started)))
     }

@@ -12,7 +12,6 @@ use std::time::Duration;
 /// Connection timeout of an auxiliary instrument, equal to that of a rig.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(11);
 
-/// Why a source cannot serve as an auxiliary instrument.
 #[derive(Debug, thiserror::Error)]
 enum ReaderProblem {
     #[error(
@@ -81,7 +80,6 @@ impl Registry {
     }
 }
 
-/// The channels to take from an auxiliary instrument.
 fn select_channels(
     choice: &ReaderChoice,
     rig: &RigDescription,

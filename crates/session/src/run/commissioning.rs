@@ -39,8 +39,7 @@ const AT_ONCE_PER_S: f64 = 1e9;
 /// Deviation of the speed that ends a commissioning, ratio. Source: the guard's band of a run without control of the speed.
 const OPEN_LOOP_BAND_RATIO: f64 = 0.25;
 
-/// The steps of a commissioning, and the campaign under which they run: its limits and guards, without a zero, a search for surge or control of the
-/// speed, and with commands that jump.
+/// The steps of a commissioning with their campaign: its limits and guards, no zero, surge search or speed control, commands that jump.
 #[derive(Debug)]
 pub struct Commissioning {
     /// The campaign under which the steps run.
@@ -54,11 +53,7 @@ pub struct Commissioning {
 type Stage = (OperatingPoint, f64, f64);
 
 impl Commissioning {
-    /// Plans the steps: at the point of the campaign nearest to 60 % of the limit of speed from which all of them are within the limits, whether the
-    /// actuators move as declared or at once.
-    ///
-    /// # Errors
-    /// [`SessionError::Preflight`] with the reason at the best point if no point allows the steps.
+    /// Plans the steps at the point nearest to 60 % of the limit of speed from which all are within the limits, with declared or ideal actuators.
     pub fn new(campaign: &Campaign, model: &Model) -> Result<Self, SessionError> {
         let declared = campaign.rig_actuators();
         let jumping = |motion: ActuatorMotion| ActuatorMotion { rate_per_s: AT_ONCE_PER_S, ..motion };
@@ -118,8 +113,7 @@ impl Commissioning {
     }
 }
 
-/// The stages about a point: P3 between two speeds and one between, the valve up and down, small steps of the valve, T3, and the low speed
-/// from which the stand is made safe.
+/// The stages about a point: P3 between two speeds and one between, the valve, small steps of the valve, T3, and the low speed to stop from.
 fn stages(campaign: &Campaign, base: OperatingPoint) -> Vec<Stage> {
     let low_rpm = LOW_SPEED_RATIO * base.speed_rpm;
     let slowest_rpm = campaign.points.iter().map(|point| point.speed_rpm).fold(base.speed_rpm, f64::min);

@@ -15,9 +15,6 @@ const BYTES_PER_VALUE: f64 = 40.0;
 const SPARE_BYTES: f64 = 50e6;
 
 /// Rejects a plan with a setpoint that the rig would refuse during the run.
-///
-/// # Errors
-/// [`SessionError::Preflight`] with the first step that it does not accept.
 pub(crate) fn check_setpoints(plan: &Plan, rig: &RigDescription) -> Result<(), SessionError> {
     let Some(accepts) = &rig.accepts else { return Ok(()) };
     for (place, step) in plan.steps.iter().enumerate() {
@@ -36,9 +33,6 @@ pub(crate) fn check_setpoints(plan: &Plan, rig: &RigDescription) -> Result<(), S
 }
 
 /// Rejects a disk without room for the whole run. Rigs with simulated time are exempt, because their run can be repeated.
-///
-/// # Errors
-/// [`SessionError::Preflight`] with the available and the required space.
 pub(crate) fn check_room(
     directory: &Path,
     duration_s: f64,

@@ -108,7 +108,6 @@ impl RunOutcome {
     }
 }
 
-/// The end of a run as data for files.
 fn for_files(end: &Result<RunEnding, RunError>) -> RunEnding {
     end.as_ref().map_or_else(|error| RunEnding::Failed { reason: error.to_string() }, Clone::clone)
 }
@@ -124,9 +123,6 @@ fn lockout_reason(end: &Result<RunEnding, RunError>) -> Option<String> {
 
 impl<'s> Session<'s> {
     /// Makes the plan or checks the stored one, rehearses a script and creates the backend. Errors here never reach the rig.
-    ///
-    /// # Errors
-    /// [`SessionError`] if the plan is missing, the stored one is stale, the script fails or the backend's settings are wrong.
     pub fn prepare<'a>(&self, request: RunRequest<'a>) -> Result<PreparedRun<'a>, SessionError> {
         let (campaign, mut request) = (request.campaign, request);
         if let Some(interrupted) = &mut request.resume {
@@ -164,9 +160,6 @@ impl<'s> Session<'s> {
     }
 
     /// Prepares the steps of a commissioning on the rig of the request's campaign.
-    ///
-    /// # Errors
-    /// [`SessionError`] if a guard is missing, the backend's settings are wrong or it refuses a setpoint.
     pub fn prepare_commissioning<'a>(
         &self,
         commissioning: &'a Commissioning,
@@ -206,9 +199,6 @@ impl PreparedRun<'_> {
     }
 
     /// Drives the rig at the pace of a clock, records, identifies, reports. With `each_sample`, each sample is polled separately.
-    ///
-    /// # Errors
-    /// If the rig is not available or the run's files cannot be created. Failures during the run are part of its outcome.
     pub fn run_paced(
         self,
         session: &Session<'_>,
@@ -365,7 +355,6 @@ impl PreparedRun<'_> {
         Ok(directory)
     }
 
-    /// The earlier recordings of a resumed run.
     fn earlier_parts(&self, directory: &Path) -> Vec<RunPart> {
         let parts = self.request.resume.iter().flat_map(|interrupted| &interrupted.parts);
         parts
@@ -500,7 +489,6 @@ fn move_earlier_results(run: &Path) -> Result<(), SessionError> {
     Ok(())
 }
 
-/// Metadata of a run for its recording.
 pub(crate) fn metadata(campaign: &Campaign, plan: &Plan) -> BTreeMap<String, String> {
     let reference = campaign.reference;
     let always = [

@@ -21,7 +21,6 @@ const TIME_TOLERANCE_S: f64 = 1e-6;
 /// Relative tolerance for equal targets: the resolution of a recording.
 const TARGET_TOLERANCE_RATIO: f64 = 1e-9;
 
-/// A step source after replay, from the first missing step on.
 struct ResumedSteps<'a> {
     inner: &'a mut dyn StepSource,
     repeat: Option<PlanStep>,
@@ -43,10 +42,6 @@ pub(crate) fn drive_resumed(
 }
 
 impl<'a> ResumedSteps<'a> {
-    /// Replays the measured data of an interrupted run to `inner`.
-    ///
-    /// # Errors
-    /// [`SessionError::NotResumable`] if the source now yields another step than the recorded one; otherwise read errors.
     fn replay(interrupted: &InterruptedRun, inner: &'a mut dyn StepSource) -> Result<Self, SessionError> {
         let mut replay = Replay { inner, interrupted, offset_s: 0.0, last: None, replayed_steps: 0 };
         for part in &interrupted.parts {
@@ -81,7 +76,6 @@ impl<'a> ResumedSteps<'a> {
     }
 }
 
-/// A marker on another clock.
 fn shift(marker: &StepMarker, offset_s: f64) -> StepMarker {
     StepMarker { start_s: marker.start_s + offset_s, end_s: marker.end_s + offset_s, ..*marker }
 }
@@ -133,7 +127,6 @@ impl StepSource for ResumedSteps<'_> {
     }
 }
 
-/// A step source during replay.
 struct Replay<'a, 'b> {
     inner: &'a mut dyn StepSource,
     interrupted: &'b InterruptedRun,
@@ -217,15 +210,10 @@ impl Replay<'_, '_> {
     }
 }
 
-/// A recording, divided into batches as in the original run.
 struct BatchReplay {
-    /// The recording in the source's time.
     recording: Recording,
-    /// Times of all channels.
     t_s: Vec<f64>,
-    /// Read position in each series.
     cursors: Vec<usize>,
-    /// Number of replayed samples and events.
     replayed_samples: usize,
     replayed_events: usize,
     until_s: f64,
@@ -252,7 +240,6 @@ impl BatchReplay {
         BatchReplay { recording, t_s, cursors, replayed_samples: 0, replayed_events: 0, until_s: offset_s }
     }
 
-    /// Replays all data up to a time, in batches of one second.
     fn replay_until(&mut self, source: &mut dyn StepSource, until_s: f64) {
         while self.until_s < until_s {
             let batch_end_s = (self.until_s + BATCH_S).min(until_s);

@@ -27,26 +27,16 @@ pub enum SignalResponse {
 }
 
 /// Stop flags of a run.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct RunStop {
     /// Stop at the end of the step: Ctrl-C once.
     pub after_step: Arc<AtomicBool>,
     /// Stop now: Ctrl-C twice, SIGTERM and other signals. Nothing ends the process before the rig is safe.
     pub now: Arc<AtomicBool>,
+    /// A [`Phase`]; first [`Phase::Planning`].
     phase: Arc<AtomicU8>,
     /// Whether a signal has already arrived while results are written.
     deferred: Arc<AtomicBool>,
-}
-
-impl Default for RunStop {
-    fn default() -> Self {
-        RunStop {
-            after_step: Arc::default(),
-            now: Arc::default(),
-            phase: Arc::new(AtomicU8::new(Phase::Planning as u8)),
-            deferred: Arc::default(),
-        }
-    }
 }
 
 impl RunStop {

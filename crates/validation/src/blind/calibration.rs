@@ -65,7 +65,6 @@ pub struct DiagnosisSummary {
 }
 
 impl DiagnosisSummary {
-    /// Score of the best cause minus that of no cause.
     fn margin(&self) -> f64 {
         self.candidates.iter().map(|(_, score)| *score).fold(f64::NEG_INFINITY, f64::max) - self.nothing
     }
@@ -146,8 +145,7 @@ fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Opt
     })
 }
 
-/// Weight of each case, 1 on average. The threshold needs many cases without a cause; together they count only as much as the
-/// prior probability of no cause, so that the fitted and judged probabilities are those that the user reads.
+/// Weight of each case, 1 on average: cases without a cause count together as much as their prior, so that probabilities are the user's.
 pub(crate) fn weights(calibration: &Calibration, observed: &[DiagnosisSummary]) -> Vec<f64> {
     let all = observed.len() as f64;
     let nothing = observed.iter().filter(|o| o.kind == CaseKind::None).count() as f64;
@@ -165,15 +163,11 @@ const QUIET_SHARE: f64 = 0.985;
 const MIN_THRESHOLD: f64 = 3.0;
 
 /// The calibration that fits the observed cases, based on the shipped one.
-///
-/// # Errors
-/// [`BlindError::Signatures`] if the shipped calibration is damaged.
 pub fn fitted(observed: &[DiagnosisSummary], made_by: String) -> Result<Calibration, BlindError> {
     Ok(fit(&shipped()?, observed, made_by))
 }
 
-/// Fits the calibration to all observed cases, weak signatures included: a hardly visible outside cause is mistaken for an effect of the
-/// catalogue, and the probabilities must reflect how often that happens.
+/// Fits the calibration to all cases, weak signatures included: hardly visible outside causes are mistaken for effects of the catalogue.
 pub fn fit(before: &Calibration, observed: &[DiagnosisSummary], made_by: String) -> Calibration {
     let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(DiagnosisSummary::margin);
     let threshold = at_least(quantile(margins, QUIET_SHARE), MIN_THRESHOLD, before.threshold);
@@ -245,8 +239,7 @@ pub fn undetermined(calibration: &Calibration) -> Vec<String> {
 /// 5.4 sigmas on (`evidence_needed` in `mapper_diagnose`, and 1.64 for the noise).
 const DETECTABLE_SIGMAS: f64 = 6.0;
 
-/// Share of the cases with detectable causes of the catalogue in which these are not among the candidates: mean of the posterior under
-/// Jeffreys' prior, with its origin. `None` without such cases.
+/// Share of cases whose detectable catalogue causes are no candidates: posterior mean (Jeffreys' prior), origin. `None` without cases.
 fn unlisted(observed: &[DiagnosisSummary]) -> Option<(f64, Origin)> {
     let is_detectable = |o: &&DiagnosisSummary| {
         !matches!(o.kind, CaseKind::None | CaseKind::Outside)
@@ -318,7 +311,6 @@ fn of_width(posterior_sigma: f64, prior_sigma: f64) -> Origin {
     if posterior_sigma > MAX_WIDTH_RATIO * prior_sigma { Origin::Prior } else { Origin::Data }
 }
 
-/// A case.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Row {
     pub features: [f64; 2],
@@ -327,8 +319,7 @@ pub(crate) struct Row {
     pub weight: f64,
 }
 
-/// Offset and slopes of the logistic that separates outside causes from the others, each with its origin. `None` if one of the classes is
-/// empty.
+/// Offset and slopes of the logistic that separates outside causes, each with its origin. `None` if one of the classes is empty.
 fn logistic(rows: &[Row]) -> Option<([f64; 3], [Origin; 3])> {
     if rows.iter().all(|row| row.outside) || rows.iter().all(|row| !row.outside) {
         return None;
@@ -366,12 +357,10 @@ fn logistic(rows: &[Row]) -> Option<([f64; 3], [Origin; 3])> {
     Some((weights, origins(&weights, &curvatures(&loss, &weights))))
 }
 
-/// Range of the offset or of a slope.
 fn bounds(place: usize) -> (f64, f64) {
     if place == 0 { (-30.0, 30.0) } else { (MIN_SLOPES[place - 1], 10.0) }
 }
 
-/// Second derivatives of the loss.
 fn curvatures(loss: &dyn Fn(&[f64; 3]) -> f64, weights: &[f64; 3]) -> Matrix3<f64> {
     const STEP: f64 = 1e-3;
     Matrix3::from_fn(|i, j| {
@@ -426,8 +415,7 @@ pub(crate) fn declared(campaign: &Campaign) -> Declared {
     }
 }
 
-/// The visibility of `effects` on a recording of a schedule with noise, offsets, tolerances and weather but without a cause. Equal seeds give
-/// equal recordings; other weather changes the signatures by a few per cent.
+/// The visibility of `effects` on a recording without a cause. Equal seeds give equal recordings; weather changes it by a few per cent.
 pub(crate) fn visibility(
     campaign: &Campaign,
     schedule: &Schedule<'_>,

@@ -31,7 +31,6 @@ pub enum BlindError {
         path.display()
     )]
     Seal { path: PathBuf, actual: String, expected: String },
-    /// The lab stopped, or its data cannot be stored.
     #[error("case {name}: {source}")]
     Run { name: String, source: RunError },
     /// A point of the campaign that the nominal model cannot hold.
@@ -112,8 +111,7 @@ impl Draw {
         }
     }
 
-    /// Draws the cases. Kinds are in random order. Causes are dealt like cards: each effect with each sign occurs once before any repeats.
-    /// Signature lengths are uniform in their logarithm. Equal settings give equal cases.
+    /// Draws cases, kinds in random order; causes are dealt like cards, signature lengths are log-uniform. Equal settings give equal cases.
     pub fn cases(&self, catalogue: &[Arc<dyn Effect>], meter: &dyn SignatureMeter) -> Vec<Case> {
         let mut random = Pcg64::seed_from_u64(self.seed);
         // Effects without influence on this machine are not causes, e.g. convection before the wheel without area there.
@@ -196,7 +194,6 @@ pub struct Cause {
 }
 
 impl Cause {
-    /// The id of the effect, and its values.
     pub(crate) fn id_and_values(&self) -> (String, Vec<f64>) {
         (self.effect.info().id.to_string(), self.values.clone())
     }
@@ -268,9 +265,6 @@ impl From<&Case> for StoredCase {
 
 impl StoredCase {
     /// The case with its causes looked up in the catalogue and among all outside causes.
-    ///
-    /// # Errors
-    /// The id of a cause that is in neither, or has other parameters.
     pub fn case(&self, catalogue: &[Arc<dyn Effect>]) -> Result<Case, String> {
         let mut known = catalogue.to_vec();
         known.extend([OutsideUse::Check, OutsideUse::Calibration].into_iter().flat_map(outside_kinds));
@@ -308,8 +302,7 @@ const INNER_SHARE: std::ops::Range<f64> = 0.15..0.6;
 /// one that makes a test impossible.
 const STEPS: std::ops::RangeInclusive<f64> = 0.02..=4.0;
 
-/// Parameter values of an effect whose signature alone has the length `sigma`, or the maximum within its range. `sign` is the direction
-/// relative to the typical step.
+/// Parameter values at which the signature alone has the length `sigma`, or the maximum in range. `sign`: direction of the typical step.
 fn strength(
     effect: &Arc<dyn Effect>,
     sign: f64,
@@ -339,7 +332,6 @@ fn strength(
     vec![value_at(parameter, sign * steps)]
 }
 
-/// Whether an effect has any influence on the measured machine.
 fn has_influence(effect: &Arc<dyn Effect>, meter: &dyn SignatureMeter) -> bool {
     // A rig that cannot run with half a typical step may run with a tenth of one.
     [0.5, 0.1].into_iter().any(|steps| {

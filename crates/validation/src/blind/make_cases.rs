@@ -105,7 +105,6 @@ fn header(campaign: &Campaign) -> RecordingHeader {
     }
 }
 
-/// Runs the cases on all cores; each is independent of the others.
 fn run_all(
     schedule: &Schedule<'_>,
     campaign: &Campaign,

@@ -1,5 +1,4 @@
-//! Reliability of the probabilities: an answer given with probability p should be right in a share p of the cases. Shares have their exact
-//! intervals.
+//! Reliability of the probabilities, with exact intervals: an answer given with probability p should be right in a share p of the cases.
 
 use crate::blind::calibration::{DiagnosisSummary, fit, shipped, weights};
 use crate::blind::cases::{BlindError, CaseKind};
@@ -69,12 +68,10 @@ pub struct Bin {
     pub effective_cases: f64,
 }
 
-/// A first answer.
 #[derive(Debug, Clone, Copy)]
 struct Answer {
     probability: f64,
     right: bool,
-    /// Weight of the case.
     weight: f64,
 }
 
@@ -85,8 +82,7 @@ pub struct Reliability {
     pub calibration: String,
     /// The classes with cases, in ascending order of probability.
     pub bins: Vec<Bin>,
-    /// Expected calibration error: the mean distance over all cases between the share of correct answers in a class and its mean
-    /// probability, fraction (Naeini, Cooper and Hauskrecht 2015); `None` without cases.
+    /// Expected calibration error, fraction (Naeini, Cooper and Hauskrecht 2015): mean distance of right share and probability, or `None`.
     pub expected_calibration_error: Option<f64>,
     /// The error expected by chance if all probabilities are correct.
     pub expected_by_chance: Option<f64>,
@@ -122,7 +118,6 @@ fn first_answer(case: &DiagnosisSummary, calibration: &Calibration) -> Option<(f
         .max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Classes, and their expected calibration error.
 fn reliability(calibration: &str, cases: &[DiagnosisSummary], answers: &[Answer]) -> Reliability {
     let all: f64 = answers.iter().map(|answer| answer.weight).sum();
     let bins: Vec<Bin> = (0..BINS)
@@ -175,11 +170,7 @@ fn bin(index: usize, members: &[&Answer], all: f64) -> Option<Bin> {
     })
 }
 
-/// Reliability by the shipped calibration, which may have been fitted to these cases, and by a five-fold
-/// cross-validation.
-///
-/// # Errors
-/// [`BlindError::Signatures`] if the shipped calibration is damaged.
+/// Reliability by the shipped calibration, which may be fitted to these cases, and by a five-fold cross-validation.
 pub fn reliabilities(observed: &[DiagnosisSummary]) -> Result<[Reliability; 2], BlindError> {
     Ok(shipped_and_cross_validated(&shipped()?, observed))
 }

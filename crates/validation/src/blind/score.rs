@@ -81,8 +81,7 @@ pub struct ScoredCase {
     pub probability: Option<f64>,
     /// Whether the diagnosis is correct.
     pub right: bool,
-    /// Length of the weakest cause's signature in the presence of the others, in sigmas; `None` without causes, and if the
-    /// answers do not contain it.
+    /// Length of the weakest cause's signature beside the others, in sigmas; `None` without causes or an answer that contains it.
     pub sigma: Option<f64>,
 }
 
@@ -145,11 +144,7 @@ pub struct Score {
     pub set_size_mean: Option<f64>,
 }
 
-/// Opens the seal of `directory` and compares NAME.diagnosis.json of each case with its answer.
-///
-/// # Errors
-/// [`BlindError`] if the directory has no cases, or the answers have been changed. A missing or broken diagnosis is
-/// counted as wrong, and is not an error.
+/// Opens the seal and compares NAME.diagnosis.json of each case with its answer. A missing or broken diagnosis is wrong, not an error.
 pub fn score(directory: &Path) -> Result<Score, BlindError> {
     let manifest = Manifest::read(&directory.join(MANIFEST_NAME))?;
     let truths = open(directory, &manifest)?;
@@ -304,7 +299,6 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
     score
 }
 
-/// A diagnosis compared with the truth.
 struct ComparedDiagnosis {
     named: BTreeSet<String>,
     set_size: usize,

@@ -47,7 +47,6 @@ impl<'a> Schedule<'a> {
         })
     }
 
-    /// The same schedule on another simulator.
     pub(crate) fn on(self, laboratory: Laboratory) -> Self {
         Schedule { laboratory, ..self }
     }
@@ -81,7 +80,6 @@ impl<'a> Schedule<'a> {
         Ok(VirtualLab::new(settings))
     }
 
-    /// Noise and random offsets as declared.
     fn sensors(&self, seed: u64) -> std::collections::BTreeMap<Channel, SensorErrors> {
         let colour = NoiseColour::default();
         let white_share = (1.0 - colour.first_order_share_ratio.powi(2)).sqrt();
@@ -104,10 +102,6 @@ impl<'a> Schedule<'a> {
             .collect()
     }
 
-    /// Records a case without its truth, and returns the truth.
-    ///
-    /// # Errors
-    /// If the lab stops or the file cannot be written.
     pub(crate) fn run(
         &self,
         case: &Case,
@@ -120,9 +114,6 @@ impl<'a> Schedule<'a> {
     }
 
     /// Runs the rig of a case without its causes on another night: the same offsets and tolerances, other noise and weather.
-    ///
-    /// # Errors
-    /// If the lab stops or the file cannot be written.
     pub(crate) fn run_reference(
         &self,
         case: &Case,
@@ -136,10 +127,6 @@ impl<'a> Schedule<'a> {
         Ok(())
     }
 
-    /// Records a case in memory.
-    ///
-    /// # Errors
-    /// If the lab stops.
     pub(crate) fn record(&self, case: &Case) -> Result<Recording, BlindError> {
         let mut destination = MemoryDestination::default();
         self.drive(case, case.seed, &mut destination)?;
@@ -149,7 +136,7 @@ impl<'a> Schedule<'a> {
     /// Uses the runner of all campaigns without guards, because a virtual machine cannot be damaged.
     fn drive(&self, case: &Case, night_seed: u64, observer: &mut dyn RunObserver) -> Result<(), BlindError> {
         let runner = Runner {
-            steps: &mut StepsOfCase::new(&self.steps, self.campaign.timing.warm_up_s),
+            steps: &mut StepsOfCase { left: self.steps.iter(), warm_up_s: self.campaign.timing.warm_up_s },
             backend: &mut self.lab(case, night_seed)?,
             clock: &mut UnpacedClock,
             guards: Vec::new(),
@@ -175,7 +162,6 @@ impl FileDestination {
         FileDestination { writer, last: SampleBatch::default(), points: Vec::new() }
     }
 
-    /// Finishes the file and returns the truth of each point.
     pub(crate) fn finish(self) -> Result<Vec<TruthPoint>, RecordError> {
         self.writer.finish()?;
         Ok(self.points)
@@ -209,7 +195,6 @@ impl RunObserver for FileDestination {
     }
 }
 
-/// Keeps the recording in memory without the truth.
 #[derive(Default)]
 pub(crate) struct MemoryDestination {
     pub(crate) recording: Recording,
@@ -264,16 +249,9 @@ pub(crate) fn steps_of_case(campaign: &Campaign, nominal: &Model) -> Result<Vec<
         .collect()
 }
 
-/// Yields these steps.
 pub(crate) struct StepsOfCase<'a> {
     left: std::slice::Iter<'a, PlanStep>,
     warm_up_s: f64,
-}
-
-impl<'a> StepsOfCase<'a> {
-    pub(crate) fn new(steps: &'a [PlanStep], warm_up_s: f64) -> Self {
-        StepsOfCase { left: steps.iter(), warm_up_s }
-    }
 }
 
 impl StepSource for StepsOfCase<'_> {

@@ -6,7 +6,7 @@ use mapper_numerics::statistics;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::{SimulationError, Simulator, Watch};
-use mapper_physics::simulation::steady::{Inputs, SteadyError, hold_speed};
+use mapper_physics::simulation::steady::{Inputs, SteadyError, SteadyState, hold_speed};
 
 /// Jumps of table 1: initial and target speed, rpm.
 pub(crate) const JUMPS: [(f64, f64); 4] = [(110e3, 50e3), (50e3, 110e3), (150e3, 90e3), (90e3, 150e3)];
@@ -23,7 +23,6 @@ const PAPER_HEAT: (f64, f64) = (9.0, 440.0);
 /// Diameter of the probes on the paper's rig, m. Source: section 4.2.
 pub(crate) const PROBE_M: f64 = 1.5e-3;
 
-/// The nominal machine with the paper's heat and probe.
 pub(crate) fn paper_machine() -> Model {
     let mut machine = Model::nominal();
     let bearing = &mut machine.params.bearing;
@@ -32,7 +31,6 @@ pub(crate) fn paper_machine() -> Model {
     machine
 }
 
-/// One jump of P3.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Jump {
     pub(crate) from_rpm: f64,
@@ -47,7 +45,6 @@ impl Jump {
     }
 }
 
-/// All jumps of table 1 at all openings, jump by jump.
 fn table_1() -> Vec<Jump> {
     JUMPS
         .into_iter()
@@ -55,7 +52,6 @@ fn table_1() -> Vec<Jump> {
         .collect()
 }
 
-/// True values of the model at each sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Truth {
     pub(crate) t_s: f64,
@@ -67,11 +63,9 @@ pub(crate) struct Truth {
     pub(crate) pressure_ratio: f64,
     pub(crate) tc_k: f64,
     pub(crate) probe_time_constant_s: f64,
-    /// Whether the housing is hotter than the gas after the wheel.
     pub(crate) heats_gas: bool,
 }
 
-/// A recorded jump with its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Run {
     pub(crate) jump: Jump,
@@ -104,23 +98,21 @@ impl Inputs for P3Jump {
     }
 }
 
-/// [`run_lagged`] with a step of P3, as in the paper's model.
-pub(crate) fn run(machine: &Model, jump: Jump, seconds: f64) -> Result<Run, ReproduceError> {
-    run_lagged(machine, jump, seconds, 0.0)
+/// The settled state at a speed and an opening, under the usual conditions.
+pub(crate) fn settled_at(model: &Model, speed_rpm: f64, opening: f64) -> Result<SteadyState, SteadyError> {
+    let boundary = BoundaryConditions { valve_opening_ratio: opening, ..BoundaryConditions::default() };
+    hold_speed(model, speed_rpm, &boundary)
 }
 
-/// Runs a jump for `seconds`: from the machine's own steady state at the from-speed, to the P3 that holds the
-/// to-speed on the nominal machine. P3 follows with `lag_s`.
+/// Runs a jump for `seconds` from the machine's own steady state to the P3 that holds the to-speed on the nominal one, lagged by `lag_s`.
 pub(crate) fn run_lagged(
     machine: &Model,
     jump: Jump,
     seconds: f64,
     lag_s: f64,
 ) -> Result<Run, ReproduceError> {
-    let at_opening =
-        BoundaryConditions { valve_opening_ratio: jump.opening, ..BoundaryConditions::default() };
-    let start = hold_speed(machine, jump.from_rpm, &at_opening)?;
-    let boundary = hold_speed(&Model::nominal(), jump.to_rpm, &at_opening)?.boundary;
+    let start = settled_at(machine, jump.from_rpm, jump.opening)?;
+    let boundary = settled_at(&Model::nominal(), jump.to_rpm, jump.opening)?.boundary;
     let inputs = P3Jump { to: boundary, from_pa: start.boundary.p3_pa, lag_s };
     let mut simulator = Simulator::new(machine, 0.0, start.state, RELATIVE_TOLERANCE, Watch::default());
     let mut recording = Recording::default();
@@ -175,9 +167,8 @@ pub(crate) fn run_lagged(
     Ok(Run { jump, recording, truth })
 }
 
-/// Runs all jumps of table 1.
 pub(crate) fn run_all(machine: &Model, seconds: f64) -> Result<Vec<Run>, ReproduceError> {
-    table_1().into_iter().map(|jump| run(machine, jump, seconds)).collect()
+    table_1().into_iter().map(|jump| run_lagged(machine, jump, seconds, 0.0)).collect()
 }
 
 /// The paper's window: 100 s from 10 s after the jump.
@@ -185,12 +176,10 @@ pub(crate) const WINDOW: WindowRule = WindowRule::Fixed { start_s: 10.0, end_s: 
 /// Minimum duration of a run for it, s.
 pub(crate) const RUN_S: f64 = 110.0;
 
-/// The dynamic method with an assumed alpha_A.
 pub(crate) fn dynamic_config(alpha_area_ratio: f64) -> IdentifyConfig {
     IdentifyConfig { window: WINDOW, alpha_area_ratio, ..IdentifyConfig::default() }
 }
 
-/// Identified and true values of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outcome {
     pub(crate) jump: Jump,
@@ -211,7 +200,6 @@ impl Outcome {
         self.point.eta.map(|eta| 100.0 * (eta - self.eta_mean))
     }
 
-    /// Identified minus final model efficiency, points.
     pub(crate) fn eta_end_error_points(&self) -> Option<f64> {
         self.point.eta.map(|eta| 100.0 * (eta - self.eta_end))
     }
@@ -252,7 +240,6 @@ pub(crate) fn identify_recording(
     })
 }
 
-/// The truth within a fixed window.
 pub(crate) fn truth_in_window<'a>(run: &'a Run, window: &WindowRule) -> &'a [Truth] {
     let (start_s, end_s) = match window {
         WindowRule::Fixed { start_s, end_s } => (*start_s, *end_s),
@@ -264,7 +251,6 @@ pub(crate) fn truth_in_window<'a>(run: &'a Run, window: &WindowRule) -> &'a [Tru
     &run.truth[start..end.max(start)]
 }
 
-/// Identifies every run.
 pub(crate) fn identify_runs(runs: &[Run], config: &IdentifyConfig) -> Result<Vec<Outcome>, ReproduceError> {
     runs.iter().map(|run| identify_run(run, config)).collect()
 }
@@ -326,7 +312,15 @@ named_enum! {
 
 impl Verdict {
     pub(crate) fn holds_if(condition: bool) -> Self {
-        if condition { Verdict::Holds } else { Verdict::Differs }
+        Verdict::of(condition, false)
+    }
+
+    pub(crate) fn of(holds: bool, holds_partly: bool) -> Self {
+        match (holds, holds_partly) {
+            (true, _) => Verdict::Holds,
+            (false, true) => Verdict::Partly,
+            (false, false) => Verdict::Differs,
+        }
     }
 }
 
@@ -375,7 +369,6 @@ pub enum ReproduceError {
     Simulation(#[from] SimulationError),
     #[error(transparent)]
     Identify(#[from] IdentifyError),
-    /// A step has no point.
     #[error(transparent)]
     Step(#[from] StepError),
     #[error("a simulated run has no step or no sample in the window")]

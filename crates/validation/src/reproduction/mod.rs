@@ -35,7 +35,7 @@ pub fn reproduce(mut progress: impl FnMut(&str)) -> Result<Vec<FigureResult>, Re
             "10" => figures::figure_10::figure()?,
             "11" => figures::figure_11::figure()?,
             "12" => figures::figure_12::figure()?,
-            _ => figures::figure_13::figure()?,
+            _ => figures::figure_12::figure_13()?,
         });
     }
     Ok(results)

@@ -56,19 +56,16 @@ pub(crate) fn h_pair(outcome: &Outcome) -> Option<(f64, f64)> {
     Some((outcome.h_mean_w_m2k, outcome.point.h_w_m2k?))
 }
 
-/// Efficiency in %, one point of error marked.
 pub(crate) fn efficiency_panel(series: Vec<Series>) -> Panel {
     let axis = ("model efficiency, %", "identified efficiency, %");
     equality_panel("(a) efficiency", axis, Some((1.0, "1 point off")), series)
 }
 
-/// h in W/(m2 K).
 pub(crate) fn h_panel(series: Vec<Series>) -> Panel {
     let axis = ("model h, W/(m2 K)", "identified h, W/(m2 K)");
     equality_panel("(b) heat-transfer coefficient", axis, None, series)
 }
 
-/// One series per target speed.
 pub(crate) fn series_by_speed(
     outcomes: &[Outcome],
     value: fn(&Outcome) -> Option<(f64, f64)>,
@@ -108,7 +105,6 @@ pub(crate) fn span_at_speed(
     lab::range(extremes(at_speed(outcomes, speed_rpm).map(value)), decimals)
 }
 
-/// The outcomes at one target speed.
 pub(crate) fn at_speed(outcomes: &[Outcome], speed_rpm: f64) -> impl Iterator<Item = &Outcome> {
     outcomes.iter().filter(move |o| o.jump.to_rpm == speed_rpm)
 }

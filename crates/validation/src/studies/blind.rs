@@ -26,7 +26,6 @@ struct BlindStudy {
     #[serde(rename = "fleet")]
     #[schemars(regex(pattern = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"), example = &"check")]
     _fleet: String,
-    /// Kind of the study.
     #[serde(rename = "study")]
     #[schemars(example = &"blind")]
     _study: String,
@@ -36,7 +35,6 @@ struct BlindStudy {
     /// Seed of all random draws.
     #[schemars(example = 424242)]
     seed: u64,
-    /// Number of cases.
     #[schemars(range(min = 1), example = 100)]
     cases: usize,
     /// Kinds of cases (none, single, pair, outside, triple); the default is the first four.
@@ -51,7 +49,6 @@ struct BlindStudy {
     sigmas: Option<[f64; 2]>,
 }
 
-/// One case.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct BlindItem {
@@ -60,7 +57,6 @@ struct BlindItem {
     laboratory: Laboratory,
 }
 
-/// Result of a case.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct BlindPart {
@@ -143,8 +139,8 @@ impl Kind for Blind<'_> {
         }
         let campaign = settings["campaign"].as_str().unwrap_or_default();
         let laboratory = Laboratory::deserialize(&settings["laboratory"]).unwrap_or_default();
-        seal(campaign, laboratory, false, &truths, out.directory()).map_err(FleetError::kind)?;
-        let scored = score(out.directory()).map_err(FleetError::kind)?;
+        seal(campaign, laboratory, false, &truths, &out.directory).map_err(FleetError::kind)?;
+        let scored = score(&out.directory).map_err(FleetError::kind)?;
         out.write("score.json", json_text(&scored).map_err(FleetError::kind)?.as_bytes())?;
         Ok(format!(
             "{} cases with their diagnoses and score.json; `mapper gap blind score` shows it",

@@ -25,7 +25,6 @@ struct CalibrationStudy {
     #[serde(rename = "fleet")]
     #[schemars(regex(pattern = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"), example = &"calibration")]
     _fleet: String,
-    /// Kind of the study.
     #[serde(rename = "study")]
     #[schemars(example = &"calibration")]
     _study: String,
@@ -43,7 +42,6 @@ struct CalibrationStudy {
     cases: usize,
 }
 
-/// One case.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CalibrationItem {

@@ -1,5 +1,4 @@
-//! `study: maps`: campaigns repeated with several seeds and identified by several methods. All points are kept, for the coverage of
-//! intervals, tables over seeds, and the scatter compared with the planner's prediction.
+//! `study: maps`: campaigns with several seeds, identified by several methods; all points are kept for coverage, tables and scatter.
 
 use crate::studies::source::{CampaignSource, StudyError};
 use mapper_core::Method;
@@ -23,11 +22,9 @@ struct MapsStudy {
     #[serde(rename = "fleet")]
     #[schemars(regex(pattern = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"), example = &"coverage")]
     _fleet: String,
-    /// Kind of the study.
     #[serde(rename = "study")]
     #[schemars(example = &"maps")]
     _study: String,
-    /// The campaigns, from this file.
     #[schemars(length(min = 1), extend("examples" = [["../turbo_a.yaml"]]))]
     campaigns: Vec<PathBuf>,
     /// Seeds, whole numbers from 0; the default is each campaign's own.
@@ -38,7 +35,6 @@ struct MapsStudy {
     methods: Option<Vec<Method>>,
 }
 
-/// One recording.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MapsItem {

@@ -29,7 +29,6 @@ struct NightlyStudy {
     #[serde(rename = "fleet")]
     #[schemars(regex(pattern = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"), example = &"night")]
     _fleet: String,
-    /// Kind of the study.
     #[serde(rename = "study")]
     #[schemars(example = &"nightly")]
     _study: String,
@@ -38,7 +37,6 @@ struct NightlyStudy {
     nightly: PathBuf,
 }
 
-/// One run.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct NightlyItem {
@@ -108,9 +106,6 @@ impl Kind for Nightly<'_> {
 }
 
 /// The rows of a merged study, for a night.
-///
-/// # Errors
-/// [`FleetError`] if the result is missing or is not of a night.
 pub fn rows_of(directory: &Path, registry: &Registry) -> Result<Vec<RunRow>, FleetError> {
     let fleet = Fleet::open(directory, &program_and_commit(registry.commit))?;
     let path = fleet.result().join(RUNS);

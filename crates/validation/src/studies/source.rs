@@ -15,7 +15,6 @@ use std::sync::{Mutex, PoisonError};
 pub enum StudyError {
     #[error("{}: its rig `{backend}` is not simulated; studies run only on backends of this program", .campaign.display())]
     Rig { campaign: PathBuf, backend: String },
-    /// A campaign that was checked when the study was made has mistakes now.
     #[error("the campaign of the item has mistakes: {0}")]
     Campaign(String),
     #[error("the item has no file {0}")]
@@ -36,17 +35,12 @@ impl From<StudyError> for FleetError {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CampaignSource {
-    /// The file.
     text: String,
     /// The files that it names, relative to its folder.
     files: BTreeMap<PathBuf, String>,
 }
 
 impl CampaignSource {
-    /// Reads a campaign and its files.
-    ///
-    /// # Errors
-    /// [`FleetError::Kind`] with all mistakes of the campaign, or if its rig is not simulated.
     pub fn read(path: &Path, registry: &Registry) -> Result<(CampaignSource, Campaign), FleetError> {
         // All mistakes, as every other command reports them.
         let campaign = load(path).map_err(FleetError::kind)?;

@@ -131,7 +131,7 @@ impl Diagnose {
             return Ok(self.output.write(file, text.as_bytes())?);
         }
         if let Err(error) = write_file(file, text.as_bytes(), Existing::Replaced) {
-            standard_output::warn(&format!("the diagnosis is not kept: {error}\n"));
+            standard_output::say(&format!("the diagnosis is not kept: {error}\n"));
         }
         Ok(())
     }

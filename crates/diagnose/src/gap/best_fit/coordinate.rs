@@ -25,19 +25,16 @@ pub(crate) struct Coordinate {
 }
 
 impl Coordinate {
-    /// The coordinate of a parameter.
     pub(crate) fn new(parameter: &EffectParameter) -> Self {
         let logarithmic = parameter.low > 0.0 && parameter.high / parameter.low > LOGARITHMIC_RATIO;
         let scale = if logarithmic { 1.0 } else { parameter.typical_step.abs().max(MIN_SCALE) };
         Coordinate { low: parameter.low, high: parameter.high, scale, logarithmic }
     }
 
-    /// Whether it is the parameter's logarithm.
     pub(crate) fn is_logarithmic(&self) -> bool {
         self.logarithmic
     }
 
-    /// Coordinate of a value.
     pub(crate) fn of(&self, value: f64) -> f64 {
         if self.logarithmic { value.max(MIN_ARGUMENT).ln() } else { value / self.scale }
     }
@@ -63,7 +60,6 @@ impl Coordinate {
         (moved, self.of(moved) - at)
     }
 
-    /// Value of a coordinate, within the parameter's range.
     pub(crate) fn value(&self, coordinate: f64) -> f64 {
         let value = if self.logarithmic { coordinate.exp() } else { coordinate * self.scale };
         value.clamp(self.low, self.high)
@@ -75,7 +71,6 @@ pub(crate) fn typical(parameter: &EffectParameter) -> f64 {
     (parameter.neutral + parameter.typical_step).clamp(parameter.low, parameter.high)
 }
 
-/// Descriptions of a hypothesis' effects, in order.
 pub(crate) fn infos<'a>(
     effects: &'a [Arc<dyn Effect>],
     hypothesis: &'a Hypothesis,
@@ -88,7 +83,6 @@ pub(crate) fn coordinates(effects: &[Arc<dyn Effect>], hypothesis: &Hypothesis) 
     infos(effects, hypothesis).flat_map(|info| &info.parameters).map(Coordinate::new).collect()
 }
 
-/// Values of all effects' parameters, in order.
 pub(crate) fn parameters(hypothesis: &Hypothesis) -> Vec<f64> {
     hypothesis.effects.iter().flat_map(|(_, values)| values.iter().copied()).collect()
 }

@@ -16,7 +16,6 @@ use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// The best fit of a hypothesis.
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
     /// Best values of nuisances and effects.
@@ -27,7 +26,6 @@ pub(crate) struct Fit {
     pub score: f64,
     /// Whitened residuals.
     pub residual: Vec<f64>,
-    /// Prediction.
     pub prediction: Prediction,
     /// Whitened change for a unit of each effect's search coordinate.
     pub effect_columns: Vec<Vec<f64>>,
@@ -35,12 +33,10 @@ pub(crate) struct Fit {
     pub covariance: DMatrix<f64>,
     /// Precision of nuisances and the effects' search coordinates, priors included.
     pub precision: DMatrix<f64>,
-    /// Predicted decrease of the cost by one more iteration. It is large if the derivatives of the nuisances differ from those where they were
-    /// linearised.
+    /// Predicted decrease of the cost by one more iteration; large if the nuisances' derivatives differ from where they were linearised.
     pub predicted_decrease: f64,
 }
 
-/// Limits of a fit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
     /// Maximum number of iterations.
@@ -51,13 +47,11 @@ pub(crate) struct Effort {
     pub max_sigmas: f64,
     /// The same of a tolerance of the rig; initial state, clocks and the shape of the map are none.
     pub max_sigmas_of_rig: f64,
-    /// Whether each point is a run of its own. If not, it follows from the run where nuisances were linearised: for fits that only select what to fit
-    /// again.
+    /// Whether each point is a run of its own; else it follows from the run of the linearisation: for fits that only select.
     pub exact: bool,
 }
 
 impl Effort {
-    /// Maximum size of a nuisance, in sigmas.
     pub(crate) fn max_sigmas_of(&self, kind: NuisanceKind) -> f64 {
         if kind.is_of_rig() { self.max_sigmas.min(self.max_sigmas_of_rig) } else { self.max_sigmas }
     }
@@ -70,7 +64,6 @@ impl Default for Effort {
     }
 }
 
-/// Start of a fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
     /// Nuisances and effects.
@@ -105,7 +98,6 @@ impl Column {
         values
     }
 
-    /// The columns of a fit.
     pub(crate) fn of(fit: &Fit) -> Vec<Column> {
         let of_unit = |column: &Vec<f64>| {
             let change = Arc::new(column.clone());
@@ -340,8 +332,7 @@ pub(crate) fn changes_near(
 /// Maximum size of a nuisance, in declared sigmas. Bound: a larger deviation is not a tolerance.
 pub(crate) const MAX_SIGMAS: f64 = 6.0;
 
-/// Refits only the initial state to the first step. Otherwise the unknown start temperature would count as a machine misfit of a held-out first
-/// step, a hundred times too large. Returns the fit unchanged if the misfit of the first step does not fall.
+/// Refits only the initial state to the first step, whose unknown start would count as a misfit; unchanged if its misfit does not fall.
 pub(crate) fn with_start_read(study: &Study, linearised: &Linearised, fit: Fit) -> Fit {
     let rows = [rows_of_step(study, 0)];
     let starts: Vec<usize> =
@@ -394,7 +385,6 @@ pub(crate) fn lengths(
 /// Length of a direction that counts as none, in sigmas. Bound: rounding of the orthogonalisation.
 const NO_LENGTH: f64 = 1e-6;
 
-/// Residual of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Adequacy {
     /// Energy in the smooth basis above its expectation, in its standard deviations.
@@ -406,13 +396,11 @@ pub(crate) struct Adequacy {
 }
 
 impl Adequacy {
-    /// Features for the probability of an unmodelled cause.
     pub(crate) fn features(&self) -> [f64; 2] {
         [self.smooth_sigma, self.scatter_sigma]
     }
 }
 
-/// Energy of a whitened residual in each group's smooth basis.
 pub(crate) fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64]) -> Vec<f64> {
     study
         .groups
@@ -443,7 +431,6 @@ pub(crate) fn smooth_energies(study: &Study, linearised: &Linearised, residual: 
         .collect()
 }
 
-/// Evaluates the residual of a fit on all steps.
 pub(crate) fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit) -> Adequacy {
     let energies = smooth_energies(study, linearised, &fit.residual);
     let expected: f64 = study.groups.iter().map(|group| RESPONSES_S.len().min(group.rows.len()) as f64).sum();

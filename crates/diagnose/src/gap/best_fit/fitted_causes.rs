@@ -15,7 +15,6 @@ use mapper_physics::simulation::steady::Inputs;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
-/// Causes with their sizes, as fitted to a recording.
 #[derive(Debug, Clone)]
 pub(crate) struct CauseFit {
     /// Tolerances and effects, by their index in the study.
@@ -31,7 +30,6 @@ impl CauseFit {
     }
 }
 
-/// A closure term with its fit.
 #[derive(Debug, Clone)]
 pub(crate) struct ClosureFit {
     pub(crate) key: ClosureKey,
@@ -41,15 +39,12 @@ pub(crate) struct ClosureFit {
 /// The fits on which everything rests that follows from a diagnosis.
 #[derive(Debug, Clone)]
 pub(crate) struct Fits {
-    /// The tolerances alone.
     pub(crate) null: CauseFit,
-    /// Those of the candidates, in their order.
     pub(crate) causes: Vec<CauseFit>,
     /// Those of the first closure term, and of those that the recording does not distinguish from it.
     pub(crate) closures: Vec<ClosureFit>,
 }
 
-/// Effect of causes on the readings of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Changes {
     /// Start of the first step, s. Earlier readings, from which a zero may have been taken, stay unchanged.
@@ -59,13 +54,11 @@ pub(crate) struct Changes {
 }
 
 impl Changes {
-    /// The changes of a study's readings by the effects of a hypothesis.
     pub(crate) fn of(study: &Study, hypothesis: &Hypothesis) -> Result<Changes, PredictError> {
         let (start_s, end_s) = study.followed_s();
         let times_s = study.table.t_s[study.table.range(start_s, end_s)].to_vec();
         let with = |step: usize| study.rig(hypothesis, step);
-        // An error of an input sensor does not act on the machine: the true inputs are equal in both runs. Its own map, shaft, turbine and valve
-        // are not removed either: an efficiency that is lower is measured, not biased.
+        // An input sensor's error does not act on the machine; the machine's own map, shaft, turbine and valve are measured, not biased.
         let bare = Hypothesis { effects: Vec::new(), ..hypothesis.clone() };
         let without = |step: usize| -> Result<(Rig, Circumstances), EffectError> {
             let (mut rig, circumstances) = study.rig(&bare, step)?;
@@ -108,13 +101,11 @@ impl Changes {
         Ok(Changes { start_s, channels })
     }
 
-    /// Whether no reading changes.
     pub(crate) fn are_none(&self) -> bool {
         self.channels.is_empty()
     }
 
-    /// The recording without these changes. At the start of the first step and the end of the last, which the model does not follow, the nearest change is
-    /// used.
+    /// The recording without these changes; the nearest where the model does not follow: the first start and the last end.
     pub(crate) fn subtracted_from(&self, mut recording: Recording) -> Recording {
         for (channel, change) in &self.channels {
             let own = recording.series.get_mut(channel).into_iter();
@@ -129,8 +120,7 @@ impl Changes {
     }
 }
 
-/// The hypotheses one standard deviation away, in each independent direction of the uncertainty of a fit's effects; `None` if the recording does not
-/// determine the effects.
+/// The hypotheses one standard deviation away in each independent direction of a fit's effects; `None` if they are not determined.
 pub(crate) fn one_sigma_away(study: &Study, fit: &CauseFit) -> Option<Vec<Hypothesis>> {
     let coordinates = coordinates(&study.effects, &fit.hypothesis);
     let mode = unknowns(&fit.hypothesis, &coordinates);

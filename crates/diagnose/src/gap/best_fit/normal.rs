@@ -10,7 +10,6 @@ pub(crate) const PRIOR_STEPS: f64 = 10.0;
 /// Precision of a parameter without influence. Bound: keeps the equations solvable.
 const MIN_PRECISION: f64 = 1e-6;
 
-/// Products of the nuisance columns over the selected steps.
 pub(crate) fn nuisance_products(
     study: &Study,
     linearised: &Linearised,
@@ -50,8 +49,7 @@ pub(crate) fn normal_matrix(
     matrix
 }
 
-/// Squared residual of `difference` (whitened) after fitting `columns`; `precision` is the prior precision of their coefficients. `None` if
-/// the equations are singular.
+/// Squared residual of whitened `difference` after fitting `columns` with prior `precision`; `None` if the equations are singular.
 fn misfit(difference: &[f64], columns: &[Vec<f64>], precision: &DMatrix<f64>) -> Option<f64> {
     let n = columns.len();
     let mut matrix = precision.clone();
@@ -96,7 +94,6 @@ pub(crate) struct Projector<'a> {
     linearised: &'a Linearised,
     rows: Vec<Range<usize>>,
     cholesky: Cholesky<f64, Dyn>,
-    /// Additional free columns.
     others: &'a [Vec<f64>],
 }
 
@@ -150,7 +147,6 @@ impl<'a> Projector<'a> {
     }
 }
 
-/// Selected steps.
 #[derive(Debug, Clone)]
 pub(crate) struct Selection {
     /// Whether each step is selected.
@@ -158,19 +154,16 @@ pub(crate) struct Selection {
 }
 
 impl Selection {
-    /// All steps.
     pub(crate) fn all(study: &Study) -> Selection {
         Selection { steps: vec![true; study.steps.len()] }
     }
 
-    /// Rows of the selected steps.
     pub(crate) fn rows(&self, study: &Study) -> Vec<Range<usize>> {
         let counts = |step: &usize| self.steps.get(*step).copied().unwrap_or(false);
         (0..study.steps.len()).filter(counts).map(|step| rows_of_step(study, step)).collect()
     }
 }
 
-/// Scalar product over some rows.
 pub(crate) fn dot_over(rows: &[Range<usize>], a: &[f64], b: &[f64]) -> f64 {
     rows.iter().map(|range| dot(&a[range.clone()], &b[range.clone()])).sum()
 }

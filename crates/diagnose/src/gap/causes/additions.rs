@@ -15,7 +15,6 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Result of adding one more effect to a fit.
 #[derive(Debug)]
 pub(crate) struct Addition {
     /// Index of the effect.
@@ -35,8 +34,7 @@ const NO_CHANGE: f64 = 1e-9;
 /// models fail.
 const INNER_SHARES: [f64; 2] = [0.33, 0.6];
 
-/// Every further effect added to a fit, in closed form from one run each; effects with interacting parameters use several starts. For `onsets`
-/// the study's candidates with an onset, as if nothing before the onset changed and nothing persisted.
+/// Every further effect added to a fit, in closed form from one run each (more if parameters interact); for `onsets` those with an onset.
 pub(crate) fn additions(
     study: &Study,
     linearised: &Linearised,
@@ -47,8 +45,7 @@ pub(crate) fn additions(
     let Some(projector) = Projector::new(study, linearised, selection, &base.effect_columns) else {
         return Vec::new();
     };
-    // At the optimum, the residual's pull on each nuisance equals its prior's. A strained tolerance therefore supports the effect that
-    // would release it.
+    // At the optimum the residual's pull on each nuisance equals its prior's: a strained tolerance supports the effect that releases it.
     let mut right_residual = projector.right(&base.residual);
     for (right, nuisance) in right_residual.iter_mut().zip(&base.hypothesis.nuisances) {
         *right -= nuisance;
@@ -82,11 +79,9 @@ struct FitNeighbourhood<'a> {
     linearised: &'a Linearised,
     projector: &'a Projector<'a>,
     base: &'a Fit,
-    /// Columns and prediction of the base.
     columns: Vec<Column>,
     prediction: Arc<Prediction>,
     right_residual: DVector<f64>,
-    /// Rows of each selected step.
     rows: Vec<Range<usize>>,
 }
 
@@ -108,7 +103,6 @@ impl FitNeighbourhood<'_> {
         start
     }
 
-    /// Whitened change due to an effect's values.
     fn change(&self, effect: usize, values: Vec<f64>) -> Option<Arc<Vec<f64>>> {
         self.linearised.change(self.study, effect, values)
     }
@@ -120,20 +114,17 @@ impl FitNeighbourhood<'_> {
         (own, self.projector.product(change, &right, &self.base.residual, &self.right_residual))
     }
 
-    /// An effect with several parameters, from one of their values.
     fn at(&self, effect: usize, values: Vec<f64>) -> Option<Addition> {
         let (own, seen) = self.products(self.change(effect, values.clone())?.as_slice());
         let gain = if own > NO_CHANGE && seen > 0.0 { seen * seen / own } else { 0.0 };
         Some(Addition { effect, gain, start: self.with(effect, values) })
     }
 
-    /// An effect with one parameter.
     fn at_one(&self, effect: usize, parameter: &EffectParameter) -> Option<Addition> {
         let (step, change, products) = self.line(effect, parameter)?;
         Some(self.along(effect, parameter, step, &change, products))
     }
 
-    /// The same effect from each onset.
     fn with_onsets(&self, effect: usize, parameter: &EffectParameter) -> Vec<Addition> {
         let Some((step, change, _)) = self.line(effect, parameter) else { return Vec::new() };
         // The products of a change that begins with a step are sums over its steps.
@@ -267,9 +258,6 @@ const TEXT: &str = include_str!("../../../calibration.json");
 
 impl Calibration {
     /// Returns the shipped calibration.
-    ///
-    /// # Errors
-    /// A parser error if the data file is corrupt.
     pub fn shipped() -> Result<Calibration, serde_json::Error> {
         serde_json::from_str(TEXT)
     }
@@ -298,9 +286,8 @@ impl Calibration {
 const MAX: f64 = 500.0;
 
 impl Calibration {
-    /// Transforms the features of an unmodelled cause for its logistic model. Smooth misfit enters as half its square, the negative
-    /// log-probability under noise. Scatter enters by order of magnitude: it grows with any cause, which linearised models follow only to a few per
-    /// cent.
+    /// Transforms the features of an unmodelled cause for its logistic model: smooth misfit as half its square (negative log-probability of
+    /// noise), scatter by order of magnitude, because linearised models follow any cause only to a few per cent.
     pub fn logistic_features([smooth_sigma, scatter_sigma]: [f64; 2]) -> [f64; 2] {
         let unlikely = 0.5 * smooth_sigma.max(0.0).powi(2);
         [unlikely.min(MAX), scatter_sigma.max(0.0).asinh()]

@@ -25,7 +25,6 @@ const PHASES: [(&str, f64); 3] = [("0-5 s", 0.0), ("5-30 s", 5.0), ("30-110 s", 
 /// Positions on the speed line from which a point is near surge, and in the middle. Bound: only shown.
 const REGIONS: (f64, f64) = (0.97, 0.75);
 
-/// A fit with its reduction of the misfit of all steps.
 #[derive(Debug)]
 pub(crate) struct Gain<'a> {
     pub fit: &'a Fit,
@@ -33,7 +32,6 @@ pub(crate) struct Gain<'a> {
     pub gain: f64,
 }
 
-/// Contribution of a machine part to an explanation.
 pub(crate) struct Part<'a> {
     pub submodel: Submodel,
     /// Its additional misfit reduction given the other parts, squared sigmas.
@@ -42,14 +40,12 @@ pub(crate) struct Part<'a> {
     pub signature: Box<dyn Fn() -> Option<Vec<f64>> + 'a>,
 }
 
-/// An explanation of the gap, in one or several parts of the machine.
 pub(crate) struct Explanation<'a> {
     /// Log evidence relative to no cause.
     pub score: f64,
     pub parts: Vec<Part<'a>>,
 }
 
-/// Cost of one more effect in log evidence: that of the first one.
 pub(crate) fn rarity(calibration: &Calibration, study: &Study) -> f64 {
     let prior = |effects: usize| prior_of_number(calibration, study.catalogue, effects);
     prior(0) - prior(1)
@@ -83,8 +79,7 @@ pub(crate) fn signature(study: &Study, fit: &Fit, effect: usize) -> Option<Vec<f
     Some(fit.prediction.values.iter().zip(&there.values).map(|(with, without)| with - without).collect())
 }
 
-/// Locations of the gap, largest first. `fits` are single effects and pairs, best first; `named` is the number of the first ones that the data do not
-/// distinguish, if a cause is named.
+/// Locations of the gap, largest first. `fits`: singles and pairs, best first; `named`: how many of them the data do not distinguish.
 pub(crate) fn places(
     (study, calibration): (&Study, &Calibration),
     linearised: &Linearised,
@@ -112,8 +107,7 @@ pub(crate) fn places(
     )
 }
 
-/// Locations of the gap from its explanations, largest first. Explanations within the share `bend` of the best gain remain open; `bend` is
-/// 0 if the best leaves only noise.
+/// Locations of the gap, largest first; explanations within the share `bend` of the best gain stay open (0 if the best leaves only noise).
 pub(crate) fn places_of(
     study: &Study,
     linearised: &Linearised,
@@ -214,7 +208,6 @@ fn show(study: &Study, linearised: &Linearised, signature: &[f64], points: &[Poi
     })
 }
 
-/// Map region as text.
 fn region(point: &PointState) -> String {
     let side = match point.surge_position_ratio {
         x if x > REGIONS.0 => "near surge",

@@ -20,9 +20,7 @@ use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Probabilities of the causes that fit a recording.
 pub(crate) struct Posterior {
-    /// The probabilities.
     pub probabilities: CauseProbabilities,
     /// Causes for the report, best first, without supersets of a better one.
     pub candidates: Vec<Candidate>,
@@ -36,8 +34,7 @@ const LATE_RATIO: f64 = 0.005;
 /// Minimum ratio of the numbers of sets of one effect more. Bound: avoids the logarithm of zero if a set has all effects.
 const MIN_SETS_RATIO: f64 = 0.1;
 
-/// Logarithm of the prior of a cause. Pairs are rarer than singles, and there are many pairs. Causes that begin during the recording are
-/// rarer still, and may begin with any step.
+/// Logarithm of a cause's prior: pairs are rarer and more numerous; causes that begin during the recording are rarer, with any step.
 pub(crate) fn prior(calibration: &Calibration, study: &Study, hypothesis: &Hypothesis) -> f64 {
     let of_number = prior_of_number(calibration, study.catalogue, hypothesis.effects.len());
     let late =
@@ -101,7 +98,6 @@ pub(crate) fn posterior(
     Posterior { probabilities, candidates, alike }
 }
 
-/// A cause for the report, without onsets and equivalent causes.
 pub(crate) fn candidate(
     calibration: &Calibration,
     effects: &[Arc<dyn Effect>],
@@ -119,7 +115,6 @@ pub(crate) fn candidate(
     }
 }
 
-/// Ids of a hypothesis' effects.
 pub(crate) fn ids(effects: &[Arc<dyn Effect>], hypothesis: &Hypothesis) -> Vec<String> {
     infos(effects, hypothesis).map(|info| info.id.to_string()).collect()
 }
@@ -138,8 +133,7 @@ fn onsets(study: &Study, fit: &Fit) -> BTreeMap<String, Onset> {
     begun.collect()
 }
 
-/// Parameters of effects with 95 % intervals, computed in the search coordinate so that they stay within range. `covariance`: of the search
-/// coordinates, in order.
+/// Parameters of effects with 95 % intervals, computed in search coordinates so that they stay in range; `covariance` is that of these.
 pub(crate) fn estimates(
     calibration: &Calibration,
     effects: &[Arc<dyn Effect>],
@@ -169,7 +163,6 @@ pub(crate) fn estimates(
     parameters.enumerate().map(estimate).collect()
 }
 
-/// Name of a parameter among those of all effects.
 pub(crate) fn name_of(info: &EffectInfo, parameter: &EffectParameter) -> String {
     if info.parameters.len() == 1 { info.id.to_string() } else { format!("{}.{}", info.id, parameter.name) }
 }
@@ -212,7 +205,6 @@ const ENOUGH_SHARE: f64 = 0.9;
 /// Range of the power of a size by which the length of a signature grows. Bound: roots to cubes; outside, rounding dominates.
 const POWERS: (f64, f64) = (0.6, 3.0);
 
-/// Smallest size at which a recording shows an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SmallestSize {
     /// The size as a value of the parameter; `None` if it lies outside the parameter's range.

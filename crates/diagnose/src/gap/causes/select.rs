@@ -48,7 +48,6 @@ const QUICK: Effort =
 const EFFORT: Effort =
     Effort { iterations: 6, enough: 0.3, max_sigmas: MAX_SIGMAS, max_sigmas_of_rig: MAX_SIGMAS, exact: true };
 
-/// Result of a search.
 #[derive(Debug)]
 pub(crate) struct SearchResult {
     /// Fit of tolerances alone.
@@ -59,7 +58,6 @@ pub(crate) struct SearchResult {
     pub relinearised: Option<(Linearised, Vec<usize>)>,
 }
 
-/// Searches all effects of the library on the selected steps.
 pub(crate) fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<SearchResult, PredictError> {
     let Search { study, selection, .. } = search;
     let mut null = fit(study, search.linearised, &study.nothing(), selection, Effort::default())?;
@@ -140,7 +138,6 @@ pub(crate) fn refit(search: &Search<'_>, fits: &[&Fit], effort: Effort) -> Vec<F
     known.ranked(search)
 }
 
-/// The most probable fit of each set, most probable first.
 pub(crate) fn ranked<'a>(search: &Search<'_>, fits: impl Iterator<Item = &'a Fit>) -> Vec<Fit> {
     let mut known = Known::default();
     fits.for_each(|fit| known.keep(search, fit.clone()));
@@ -203,8 +200,7 @@ impl Causes for Search<'_> {
     }
 }
 
-/// Removes members of sets that the recording does not support: effects whose 95 % interval contains neutral, and onsets without evidence against the
-/// same effect throughout.
+/// Removes effects whose 95 % interval contains neutral, and onsets without evidence against the same effect throughout.
 pub(crate) fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
     let simpler = |fit: &Fit| -> Option<Fit> {
         let study = search.study;
@@ -251,8 +247,7 @@ fn undetermined(search: &Search<'_>, fit: &Fit) -> Option<usize> {
     None
 }
 
-/// Whether every effect of a fit changes the prediction. An effect at its neutral value, or one that this machine cannot have (convection before the wheel
-/// without area there), explains nothing.
+/// Whether every effect of a fit changes the prediction; one at neutral, or one that this machine cannot have, explains nothing.
 fn all_effects_act(study: &Study, fitted: &Fit) -> bool {
     let mut columns = fitted.effect_columns.as_slice();
     fitted.hypothesis.effects.iter().all(|(index, values)| {

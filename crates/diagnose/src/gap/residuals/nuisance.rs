@@ -23,21 +23,16 @@ pub(crate) const OFFSET_PREFIX: &str = "offset of ";
 /// Kind of nuisance parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NuisanceKind {
-    /// Fixed offset of a sensor.
     Offset(Channel),
     /// Common offset of all sensors of one dimension that were compared at rest.
     CommonOffset(Dimension),
-    /// Gain of a sensor.
     Gain(Channel),
-    /// One quantity of machine, cell or initial state.
     Perturbation(Perturbation),
     /// Gas temperature drop through the turbine relative to the shaft power.
     TurbineDrop,
-    /// A smooth deviation of the efficiency map.
     Shape(usize),
     /// Clock error of one output, by its index in [`OUTPUTS`].
     Delay(usize),
-    /// Error of the lag of the valve.
     ValveLag,
     /// A part of an output that the model's equations miss in every step: the output's index in [`OUTPUTS`], and the part's.
     Structure(usize, usize),
@@ -87,7 +82,6 @@ impl std::fmt::Display for NuisanceKind {
 /// A nuisance parameter with its prior.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nuisance {
-    /// Kind.
     pub kind: NuisanceKind,
     /// Prior mean, in the unit of the changed quantity: 0 for the nominal rig, or the value from an earlier recording of this rig.
     pub centre: f64,
@@ -179,7 +173,6 @@ pub(crate) struct Circumstances {
     pub t4_drop_ratio: f64,
     /// Coefficients of the efficiency map's shape.
     pub shape: [f64; SHAPES],
-    /// Clock delay of each output, s.
     pub delay_s: [f64; OUTPUTS.len()],
     /// Missed share of each output's parts.
     pub missed_ratio: [[f64; RESPONSES_S.len()]; OUTPUTS.len()],
@@ -231,7 +224,6 @@ pub(crate) type EffectValues = Vec<(usize, Vec<f64>)>;
 pub struct Hypothesis {
     /// Nuisances, in their sigmas.
     pub nuisances: Vec<f64>,
-    /// Effects.
     pub effects: EffectValues,
 }
 
@@ -283,8 +275,7 @@ pub(crate) struct ShapedMap {
     pub coefficients: [f64; SHAPES],
 }
 
-/// Gaussian bumps, a fifth of the speed range and a third of a speed line wide. A deviation may rise and fall from one operating point to
-/// the next, and is smooth in between.
+/// Gaussian bumps, a fifth of the speed range and a third of a speed line wide: deviations differ from point to point, smooth in between.
 fn basis(speed_corrected_rpm: f64, surge_position_ratio: f64) -> [f64; SHAPES] {
     let speed = speed_corrected_rpm / SPEED_UNIT_RPM;
     let position = surge_position_ratio.clamp(0.0, 1.0);
@@ -294,8 +285,7 @@ fn basis(speed_corrected_rpm: f64, surge_position_ratio: f64) -> [f64; SHAPES] {
     std::array::from_fn(|i| over_speed[i / WAYS] * over_way[i % WAYS])
 }
 
-/// `exp(-(x - i)^2 / 2)` for i = 0, 1, ... Each value follows from the one before by a ratio that falls by e, because exponentials dominate
-/// the computing time of a diagnosis.
+/// `exp(-(x - i)^2 / 2)` for i = 0, 1, ..., each from the one before: exponentials would dominate the time of a diagnosis.
 fn bumps<const N: usize>(widths_from_first: f64) -> [f64; N] {
     let x = widths_from_first.clamp(-MAX_WIDTHS, MAX_WIDTHS);
     let (mut bump, mut ratio) = ((-0.5 * x * x).exp(), (x - 0.5).exp());

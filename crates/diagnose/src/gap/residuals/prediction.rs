@@ -20,7 +20,6 @@ use std::sync::Arc;
 /// Time before the end of a part at which its last inputs are read, s. Bound: shorter than any sample, longer than rounding.
 const BEFORE_END_S: f64 = 1e-6;
 
-/// Steps with a constant rig.
 struct Segment {
     first: usize,
     /// Start and end, s; infinite at both ends of the recording.
@@ -46,7 +45,6 @@ impl Study {
         machine
     }
 
-    /// Segments of steps with a constant rig under a hypothesis.
     fn segments(&self, hypothesis: &Hypothesis) -> Vec<Segment> {
         let shares = |step: usize| {
             let effects = hypothesis.effects.iter();
@@ -136,7 +134,6 @@ impl Study {
         Ok(samples)
     }
 
-    /// Readings of the sensors of these rigs from a run of the machine.
     fn sense(
         &self,
         samples: &[Sample],
@@ -180,9 +177,6 @@ impl Study {
     }
 
     /// Predicts the recording.
-    ///
-    /// # Errors
-    /// An error if a value is out of its range or the model cannot follow.
     pub fn predict(&self, hypothesis: &Hypothesis) -> Result<Prediction, PredictError> {
         let machine = self.machine(hypothesis);
         let samples = self.samples(&machine, |step| self.rig(&machine, step), &self.times_s)?;
@@ -314,8 +308,7 @@ impl Study {
         Ok(Prediction { values, slopes, run })
     }
 
-    /// Settled state under the first inputs, shifted by the circumstances. If the metal had not settled when the recording began, its
-    /// measured temperature is kept.
+    /// Settled state under the first inputs, shifted by the circumstances; metal that had not settled keeps its measured temperature.
     fn start(
         &self,
         rig: &Rig,
@@ -339,10 +332,8 @@ impl Study {
     }
 }
 
-/// Model state at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct PointState {
-    /// Shaft speed, rpm.
     pub speed_rpm: f64,
     /// Isentropic efficiency, fraction.
     pub efficiency: f64,
@@ -411,13 +402,11 @@ impl Study {
         Ok(positions)
     }
 
-    /// Model state at the end of each step.
     pub(crate) fn points(&self, hypothesis: &Hypothesis) -> Result<Vec<PointState>, PredictError> {
         Ok(self.points_with_others(hypothesis, &[])?.into_iter().map(|(point, _)| point).collect())
     }
 
-    /// Model state at the end of each step, and the efficiency and h of other hypotheses' models at the same speed, pressures and metal
-    /// temperatures.
+    /// Model state at the end of each step, with efficiency and h of other hypotheses' models at the same speed, pressures and metal.
     pub(crate) fn points_with_others(
         &self,
         hypothesis: &Hypothesis,

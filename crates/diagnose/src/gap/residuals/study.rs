@@ -44,7 +44,6 @@ pub struct StudyStep {
     pub jumped: bool,
     /// Whether it begins with a ramp that is longer than a jump.
     pub ramped: bool,
-    /// Its blocks.
     pub blocks: Vec<Block>,
 }
 
@@ -55,11 +54,9 @@ pub struct Prediction {
     pub values: Vec<f64>,
     /// Their slopes, unit/s.
     pub slopes: Vec<f64>,
-    /// The machine's run behind it.
     pub(crate) run: Arc<MachineRun>,
 }
 
-/// Errors that prevent a prediction.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum PredictError {
@@ -100,14 +97,12 @@ pub struct Study {
     pub actuators: Actuators,
     /// Scatter of the sample times, s: it adds uncertainty to moving quantities.
     pub scatter_s: f64,
-    /// Whether the metal had settled when the recording began.
     pub(crate) rested: bool,
     pub(crate) grid: FrozenGrid,
     /// Times at which the model is evaluated: two per block, and one at each jump.
     pub(crate) times_s: Vec<f64>,
     /// Step and block of each time; `None` at a jump.
     pub(crate) places: Vec<Option<(usize, usize)>>,
-    /// Row of each output in each step's blocks.
     pub(crate) rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>>,
     /// For each group the noise of the subtracted values, unit squared; empty if nothing was subtracted.
     pub(crate) other_noise: Vec<DMatrix<f64>>,
@@ -133,7 +128,6 @@ const RAMP: Schedule = Schedule { lengths_s: &[(1.0, 0.2), (3.0, 0.5), (f64::INF
 /// Ramps up to this length count as jumps, s. Bound: until then the blocks after a jump are those of a ramp.
 const SHORT_RAMP_S: f64 = 3.0;
 
-/// The blocks of a ramp, and of what settles after it from its end on.
 fn blocks_of_ramp(table: &Table, (start_s, ramp_end_s, end_s): (f64, f64, f64)) -> Vec<Block> {
     let mut of_step = blocks(table, start_s, ramp_end_s.min(end_s), &RAMP);
     let after = blocks(table, ramp_end_s, end_s, &AFTER_JUMP);
@@ -194,7 +188,6 @@ impl Study {
         Study::with_actuators(recording, table, declared, model, effects, actuators)
     }
 
-    /// Prepares a recording.
     pub(crate) fn with_actuators(
         recording: &Recording,
         table: Table,
@@ -323,7 +316,6 @@ impl Study {
         Hypothesis { nuisances: vec![0.0; self.nuisances.len()], effects: Vec::new() }
     }
 
-    /// The rig of a hypothesis in one step, and its operating circumstances.
     pub(crate) fn rig(
         &self,
         hypothesis: &Hypothesis,

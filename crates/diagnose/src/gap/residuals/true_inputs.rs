@@ -114,8 +114,7 @@ pub struct Actuators {
 }
 
 impl Actuators {
-    /// With declared tolerances, measured P3 drives the model and is compared with its declared lag, and the valve moves as declared, otherwise
-    /// at once. Without them, both responses are estimated from the recording.
+    /// With declared tolerances, measured P3 drives the model and the valve moves as declared; without, both responses are estimated.
     pub fn of(
         table: &Table,
         recording: &Recording,
@@ -193,7 +192,6 @@ pub(crate) fn rested(table: &Table, start_s: f64) -> bool {
 /// One run of the machine: the quantities at its sensors, at each time of a study.
 #[derive(Debug, Clone)]
 pub(crate) struct MachineRun {
-    /// The hypothesis without sensors of outputs.
     pub(crate) machine: Hypothesis,
     /// Whether the model was integrated; if not, the run follows from another.
     pub(crate) is_exact: bool,
@@ -214,7 +212,6 @@ impl LinearisedMachine {
     }
 }
 
-/// The machine at one time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sample {
     /// True values of [`OUTPUTS`].
@@ -225,9 +222,7 @@ pub(crate) struct Sample {
     pub(crate) turbine_drop_k: f64,
 }
 
-/// The values of a sample.
 pub(crate) type SampleValues = [f64; OUTPUTS.len() + 7];
-/// A run with its derivatives and those of its samples.
 pub(crate) type LinearisedSamples = LinearisedRun<{ OUTPUTS.len() + 7 }>;
 
 impl Sample {

@@ -17,7 +17,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// The study linearised at a hypothesis: prediction, whitening, derivatives of nuisances, and changes due to effects.
 #[derive(Debug)]
 pub(crate) struct Linearised {
-    /// Where.
     hypothesis: Hypothesis,
     /// Prediction there.
     pub base: Prediction,
@@ -35,7 +34,6 @@ pub(crate) struct Linearised {
 /// A whitened change; `None` if the model cannot follow.
 type Change = Option<Arc<Vec<f64>>>;
 
-/// Noise of the values of each group.
 #[derive(Debug, Clone)]
 struct Noise {
     covariances: Arc<Vec<DMatrix<f64>>>,
@@ -57,7 +55,6 @@ impl Noise {
 }
 
 impl Linearised {
-    /// Linearises at the nominal model.
     pub(crate) fn new(study: &Study) -> Result<Linearised, PredictError> {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
@@ -75,7 +72,6 @@ impl Linearised {
         Ok(Linearised::without_columns(nothing, base, noise))
     }
 
-    /// Linearises at a hypothesis and keeps the whitening.
     pub(crate) fn at(&self, study: &Study, hypothesis: &Hypothesis) -> Result<Linearised, PredictError> {
         let base = study.predict(hypothesis)?;
         let machine = LinearisedMachine::of(&base.run);
@@ -107,8 +103,7 @@ impl Linearised {
         linearised
     }
 
-    /// Whitened change due to one effect more, instead of one of the same family. It is computed once: near the hypothesis, effects change
-    /// each other's changes by little.
+    /// Whitened change due to one effect more, instead of one of its family; computed once, because effects change each other by little.
     pub(crate) fn change(&self, study: &Study, effect: usize, values: Vec<f64>) -> Change {
         let key = (effect, values.iter().map(|value| value.to_bits()).collect());
         let known = || self.further.lock().unwrap_or_else(PoisonError::into_inner);
@@ -136,7 +131,6 @@ impl Linearised {
         change
     }
 
-    /// Whitens a vector in the residuals' layout, in place.
     pub(crate) fn whiten(&self, study: &Study, values: &mut [f64]) {
         for (group, factor) in study.groups.iter().zip(self.noise.factors.iter()) {
             factor.whiten(&mut values[group.rows.clone()]);
@@ -148,12 +142,10 @@ impl Linearised {
         &self.noise.covariances[group]
     }
 
-    /// Whitens values of one group, in place.
     pub(crate) fn whiten_group(&self, group: usize, values: &mut [f64]) {
         self.noise.factors[group].whiten(values);
     }
 
-    /// Whitened residual of a prediction.
     pub(crate) fn residual(&self, study: &Study, prediction: &Prediction) -> Vec<f64> {
         let mut residual: Vec<f64> =
             study.measured.iter().zip(&prediction.values).map(|(seen, predicted)| seen - predicted).collect();
@@ -161,7 +153,6 @@ impl Linearised {
         residual
     }
 
-    /// Predicts and returns the whitened residual.
     pub(crate) fn residual_of(
         &self,
         study: &Study,
@@ -232,7 +223,6 @@ fn products_of_step(study: &Study, columns: &[Vec<f64>], step: usize) -> DMatrix
     products
 }
 
-/// Scalar product.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
@@ -269,7 +259,6 @@ fn lost_to_surge(study: &Study, nothing: &Hypothesis) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Covariance of the values of each group.
 fn covariances(
     study: &Study,
     nothing: &Hypothesis,

@@ -17,7 +17,6 @@ const OIL_SCALES: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 struct Case {
     oil_scale: f64,
     outcomes: Vec<Outcome>,
-    /// Housing temperature at the end of each run, K.
     tc_end_k: Vec<f64>,
 }
 

@@ -1,10 +1,9 @@
-//! Figure 11: (a) efficiency by conventional and by dynamic mapping on a noisy rig; (b) the heat-transfer coefficient when the gas heats
-//! the housing and when the housing heats the gas.
+//! Figure 11: (a) efficiency by conventional and dynamic mapping on a noisy rig; (b) h when gas heats housing and when housing heats gas.
 
 use crate::reproduction::figures::figure_12::{P3_LAG_S, RIG, SEEDS, add_sensor_errors, config, draw_errors};
 use crate::reproduction::lab::{
     JUMPS, Jump, OPENINGS, Outcome, RUN_S, Run, WINDOW, dynamic_config, extremes, fixed, identify_recording,
-    identify_run, paper_machine, range, rms, run_all, run_lagged, truth_in_window, worst,
+    identify_run, paper_machine, range, rms, run_all, run_lagged, settled_at, truth_in_window, worst,
 };
 use crate::reproduction::picture::{h_pair, h_panel};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
@@ -12,9 +11,8 @@ use mapper_chart::{Axis, Figure, Marker, Panel, Scatter, palette};
 use mapper_core::Channel;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::apparent_efficiency;
-use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
-use mapper_physics::simulation::steady::{SteadyState, hold_speed};
+use mapper_physics::simulation::steady::SteadyState;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
@@ -39,9 +37,7 @@ struct Mapped {
     to_rpm: f64,
     /// Apparent minus true efficiency when the point has settled at 500 degC, points.
     steady_points: f64,
-    /// The dynamic method after the jump.
     dynamic: Outcome,
-    /// Whether the jump cools the housing.
     is_cooling: bool,
 }
 
@@ -64,10 +60,8 @@ fn mapped() -> Result<Vec<Mapped>, ReproduceError> {
     let mut cases = Vec::new();
     for (from_rpm, to_rpm) in JUMPS {
         for opening in OPENINGS {
-            let boundary =
-                BoundaryConditions { valve_opening_ratio: opening, ..BoundaryConditions::default() };
             let run = run_lagged(&machine, Jump { from_rpm, to_rpm, opening }, RUN_S, P3_LAG_S)?;
-            cases.push((run, hold_speed(&machine, to_rpm, &boundary)?));
+            cases.push((run, settled_at(&machine, to_rpm, opening)?));
         }
     }
     let mut all = Vec::new();
@@ -100,6 +94,7 @@ fn ways_of_mapping(all: &[Mapped]) -> Vec<Statement> {
     let text = |value: Option<f64>| fixed(value.unwrap_or(f64::NAN), 2);
     let better = dynamic_rms < steady_rms;
     let slow = extremes(at(&[50e3]).map(dynamic));
+    let is_above = |points: f64| slow.is_some_and(|(_, high)| high > points);
     let errors = |cooling: bool| {
         let h = all.iter().filter(move |one| one.is_cooling == cooling);
         let h = h.map(|one| one.dynamic.h_error_percent());
@@ -115,20 +110,12 @@ fn ways_of_mapping(all: &[Mapped]) -> Vec<Statement> {
                 text(steady_rms),
                 text(dynamic_rms)
             ),
-            match (steady_worst > 4.5, better) {
-                (true, true) if below_3 == count => Verdict::Holds,
-                (_, true) => Verdict::Partly,
-                _ => Verdict::Differs,
-            },
+            Verdict::of(steady_worst > 4.5 && better && below_3 == count, better),
         ),
         Statement::new(
             "At 50 krpm the dynamic method over-predicts by more than 10 points.",
             format!("{} points at 50 krpm.", range(slow, 1)),
-            match slow {
-                Some((_, high)) if high > 10.0 => Verdict::Holds,
-                Some((_, high)) if high > 3.0 => Verdict::Partly,
-                _ => Verdict::Differs,
-            },
+            Verdict::of(is_above(10.0), is_above(3.0)),
         ),
         Statement::new(
             "On the rig the coefficients of jumps that heat the housing are reasonable, those of jumps that cool it are not.",
@@ -137,11 +124,7 @@ fn ways_of_mapping(all: &[Mapped]) -> Vec<Statement> {
                 fixed(heated, 0),
                 fixed(cooled, 0)
             ),
-            match cooled / heated {
-                ratio if ratio > 2.0 && heated < 20.0 => Verdict::Holds,
-                ratio if ratio > 1.2 => Verdict::Partly,
-                _ => Verdict::Differs,
-            },
+            Verdict::of(cooled / heated > 2.0 && heated < 20.0, cooled / heated > 1.2),
         ),
     ]
 }
@@ -185,11 +168,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
         Statement::new(
             "It fails to capture the correlation where the housing heats the gas.",
             format!("h {} % off.", range(cooling, 0)),
-            match size(cooling) {
-                size if size > 30.0 => Verdict::Holds,
-                size if size > 15.0 => Verdict::Partly,
-                _ => Verdict::Differs,
-            },
+            Verdict::of(size(cooling) > 30.0, size(cooling) > 15.0),
         ),
     ]);
     let mut table = Table::new([

@@ -33,12 +33,10 @@ fn within(changes: Option<(f64, f64)>, limits: (f64, f64)) -> Verdict {
     };
     // The paper prints whole percents.
     let (from, to) = (limits.0 - 0.5, limits.1 + 0.5);
-    match (low >= from && high <= to, low <= to && high >= from) {
-        (true, _) => Verdict::Holds,
-        (false, true) => Verdict::Partly,
-        _ => Verdict::Differs,
-    }
+    Verdict::of(low >= from && high <= to, low <= to && high >= from)
 }
+
+type Value = fn(&Truth) -> f64;
 
 /// Seconds until a quantity has made [`ONE_TIME_CONSTANT`] of its change.
 fn time_constant_s(run: &Run, value: fn(&Truth) -> f64) -> f64 {
@@ -50,10 +48,13 @@ fn time_constant_s(run: &Run, value: fn(&Truth) -> f64) -> f64 {
 /// Seconds after which flow, pressure ratio and speed stay within the paper's variations over 100 s; `None` if they do not within the run.
 fn stable_s(run: &Run) -> Option<f64> {
     let bands = SettleBands::PAPER;
-    let values: [fn(&Truth) -> f64; 3] = [|t| t.flow_kg_s, |t| t.pressure_ratio, |t| t.speed_rpm];
-    let bands = [bands.flow_ratio, bands.pressure_ratio_ratio, bands.speed_ratio];
+    let signals: [(Value, f64); 3] = [
+        (|t| t.flow_kg_s, bands.flow_ratio),
+        (|t| t.pressure_ratio, bands.pressure_ratio_ratio),
+        (|t| t.speed_rpm, bands.speed_ratio),
+    ];
     let mut start_s = 0.0f64;
-    for (value, band) in values.into_iter().zip(bands) {
+    for (value, band) in signals {
         let last = value(run.truth.last()?);
         let (mut low, mut high) = (last, last);
         let leaves = run.truth.iter().rev().find(|truth| {
@@ -74,6 +75,7 @@ fn properties() -> Vec<Statement> {
     let ln_prandtl =
         |t_k: f64| heat_capacity_j_kgk(t_k).ln() + viscosity_pa_s(t_k).ln() - ln_conductivity_ratio(t_k);
     let prandtl = change_percent(ln_prandtl);
+    let [re, pr] = [within(reynolds, (4.0, 6.0)), within(prandtl, (0.0, 0.0))];
     // The skin keeps its temperature.
     let h = |exponent: f64| {
         change_percent(|t_k| {
@@ -81,6 +83,7 @@ fn properties() -> Vec<Statement> {
         })
     };
     let (appendix_a, eq_9) = (h(1.13), h(0.8));
+    let is_small = |percent: Option<(f64, f64)>| percent.is_some_and(|(a, b)| a.abs().max(b.abs()) < 1.0);
     vec![
         Statement::new(
             "A change of 26 K at 20 to 200 degC changes the density of air by 4 to 6 % (section 3).",
@@ -100,11 +103,7 @@ fn properties() -> Vec<Statement> {
         Statement::new(
             "Re changes by 4 to 6 % and Pr by less than 0.3 %.",
             format!("Re {} % at constant flow, Pr {} %.", range(reynolds, 1), range(prandtl, 1)),
-            match (within(reynolds, (4.0, 6.0)), within(prandtl, (0.0, 0.0))) {
-                (Verdict::Holds, Verdict::Holds) => Verdict::Holds,
-                (Verdict::Differs, _) => Verdict::Differs,
-                _ => Verdict::Partly,
-            },
+            Verdict::of([re, pr] == [Verdict::Holds; 2], re != Verdict::Differs),
         ),
         Statement::new(
             "Therefore h changes by less than 1 % and may be taken as constant.",
@@ -113,16 +112,7 @@ fn properties() -> Vec<Statement> {
                 range(appendix_a, 1),
                 range(eq_9, 1)
             ),
-            match (appendix_a, eq_9) {
-                (Some(a), Some(b)) if a.1.abs().max(a.0.abs()) < 1.0 => {
-                    if b.1.abs().max(b.0.abs()) < 1.0 {
-                        Verdict::Holds
-                    } else {
-                        Verdict::Partly
-                    }
-                }
-                _ => Verdict::Differs,
-            },
+            Verdict::of(is_small(appendix_a) && is_small(eq_9), is_small(appendix_a)),
         ),
     ]
 }

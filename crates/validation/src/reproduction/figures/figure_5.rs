@@ -1,6 +1,6 @@
 //! Figure 5: conventional mapping; apparent efficiency of settled points at several turbine inlet temperatures.
 
-use crate::reproduction::lab::{extremes, fixed, paper_machine, range, signed_or_dash, worst};
+use crate::reproduction::lab::{extremes, fixed, paper_machine, range, settled_at, signed_or_dash, worst};
 use crate::reproduction::picture::{krpm, speed_colour, target_speeds_rpm};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Scatter};
@@ -38,8 +38,7 @@ pub(crate) fn apparent_eta(steady: &SteadyState) -> f64 {
 
 /// Apparent minus true efficiency of a settled point at 500 degC, points.
 pub(crate) fn hot_error_points(model: &Model, speed_rpm: f64, opening: f64) -> Result<f64, ReproduceError> {
-    let boundary = BoundaryConditions { valve_opening_ratio: opening, ..BoundaryConditions::default() };
-    let steady = hold_speed(model, speed_rpm, &boundary)?;
+    let steady = settled_at(model, speed_rpm, opening)?;
     Ok(100.0 * (apparent_eta(&steady) - steady.outputs.efficiency))
 }
 
@@ -61,13 +60,8 @@ fn below_adiabatic() -> Result<Statement, ReproduceError> {
             range(extremes(fast.into_iter().map(Some)), 1)
         ));
     }
-    let verdict = match signs[..] {
-        [true, _] => Verdict::Holds,
-        [_, true] => Verdict::Partly,
-        _ => Verdict::Differs,
-    };
     let paper = "The apparent efficiency of hot steady points is below the adiabatic one except at 150 krpm (section 5.3: \"as in simulation\").";
-    Ok(Statement::new(paper, format!("{}.", texts.join("; ")), verdict))
+    Ok(Statement::new(paper, format!("{}.", texts.join("; ")), Verdict::of(signs[0], signs[1])))
 }
 
 /// Section 2.1: where the heat of the turbine housing goes.
@@ -87,10 +81,7 @@ fn heat_of_the_turbine() -> Result<Statement, ReproduceError> {
             range(nominal, 0).replace('+', ""),
             range(paper, 0).replace('+', "")
         ),
-        match paper {
-            Some((low, high)) if low > 60.0 && high < 80.0 => Verdict::Holds,
-            _ => Verdict::Partly,
-        },
+        Verdict::of(paper.is_some_and(|(low, high)| low > 60.0 && high < 80.0), true),
     ))
 }
 
@@ -126,8 +117,7 @@ fn places() -> Result<Vec<Place>, ReproduceError> {
     let mut places = Vec::new();
     for speed_rpm in target_speeds_rpm() {
         for opening in OPENINGS {
-            let hot = BoundaryConditions { valve_opening_ratio: opening, ..BoundaryConditions::default() };
-            let hot = hold_speed(&model, speed_rpm, &hot)?;
+            let hot = settled_at(&model, speed_rpm, opening)?;
             places.push(Place {
                 speed_rpm,
                 opening,

@@ -2,8 +2,8 @@
 
 use crate::reproduction::figures::figure_5::apparent_eta;
 use crate::reproduction::lab::{
-    Outcome, Run, WINDOW, dynamic_config, extremes, fixed, identify_runs, range, rms, signed, signed_or_dash,
-    truth_in_window, worst,
+    Outcome, Run, WINDOW, dynamic_config, extremes, fixed, identify_runs, range, rms, settled_at, signed,
+    signed_or_dash, truth_in_window, worst,
 };
 use crate::reproduction::picture::{
     efficiency_pair, efficiency_panel, h_pair, h_panel, series_by_speed, speed_colour, target_speeds_rpm,
@@ -11,9 +11,7 @@ use crate::reproduction::picture::{
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Figure, Marker};
 use mapper_numerics::statistics::mean;
-use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
-use mapper_physics::simulation::steady::hold_speed;
 
 pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
     let outcomes = identify_runs(runs, &dynamic_config(0.0))?;
@@ -43,13 +41,7 @@ pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
                 fixed(eta_end_worst, 2),
                 outcomes.len()
             ),
-            if eta_end_worst < 1.0 {
-                Verdict::Holds
-            } else if eta_worst < 1.05 {
-                Verdict::Partly
-            } else {
-                Verdict::Differs
-            },
+            Verdict::of(eta_end_worst < 1.0, eta_worst < 1.05),
         ),
         Statement::new(
             "Convective heat transfer with a nRMSE of 3.2 % (section 5.1, conclusion 2; the abstract's 1 % is an erratum).",
@@ -124,11 +116,8 @@ pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
     })
 }
 
-/// Apparent efficiency when the target point has settled at 500 degC.
 fn steady_hot(outcome: &Outcome) -> Result<f64, ReproduceError> {
-    let boundary =
-        BoundaryConditions { valve_opening_ratio: outcome.jump.opening, ..BoundaryConditions::default() };
-    Ok(apparent_eta(&hold_speed(&Model::nominal(), outcome.jump.to_rpm, &boundary)?))
+    Ok(apparent_eta(&settled_at(&Model::nominal(), outcome.jump.to_rpm, outcome.jump.opening)?))
 }
 
 /// Root mean square error of h over its range and over its mean, %.

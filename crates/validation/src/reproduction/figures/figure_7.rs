@@ -13,7 +13,6 @@ const NOMINAL_DURATION_S: f64 = 100.0;
 /// Duration of the runs, s.
 pub(crate) const RUN_S: f64 = 210.0;
 
-/// The drawn values of an outcome.
 type Value = fn(&Outcome) -> Option<f64>;
 
 struct Case {
@@ -81,13 +80,11 @@ pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
                 fixed(eta(&durations, 200.0), 2)
             ),
             // The paper states an improvement; a longer one than stated also supports it.
-            if eta(&durations, 5.0) > eta(&durations, 100.0)
-                && eta(&durations, 200.0) <= eta(&durations, 100.0)
-            {
-                Verdict::Partly
-            } else {
-                Verdict::Differs
-            },
+            Verdict::of(
+                false,
+                eta(&durations, 5.0) > eta(&durations, 100.0)
+                    && eta(&durations, 200.0) <= eta(&durations, 100.0),
+            ),
         ),
         Statement::new(
             "The heat-transfer coefficient is stable once the window is longer than 25 s.",
@@ -124,13 +121,7 @@ pub(crate) fn figure(runs: &[Run]) -> Result<FigureResult, ReproduceError> {
                 fixed(worst_short, 2),
                 fixed(worst_offset, 2)
             ),
-            if worst_short < 1.0 && worst_offset < 1.0 {
-                Verdict::Holds
-            } else if worst_long < 1.05 {
-                Verdict::Partly
-            } else {
-                Verdict::Differs
-            },
+            Verdict::of(worst_short < 1.0 && worst_offset < 1.0, worst_long < 1.05),
         ),
     ];
     let mut table = Table::new([
@@ -189,17 +180,13 @@ fn picture(durations: &[Case], offsets: &[Case]) -> String {
     let (eta, h): (Value, Value) = (Outcome::eta_error_points, Outcome::h_error_percent);
     let (duration, offset) = ("duration of the window, s", "start of the window after the jump, s");
     let (eta_axis, h_axis) = ("efficiency, rms error, points", "h, rms error, %");
-    let shown: Vec<Case> = offsets
-        .iter()
-        .filter(|case| case.value_s >= 5.0)
-        .map(|case| Case { value_s: case.value_s, outcomes: case.outcomes.clone() })
-        .collect();
+    let shown = &offsets[offsets.partition_point(|case| case.value_s < 5.0)..];
     Figure::new("Figure 7: duration and start of the identification window")
         .subtitle("errors against the mean of the model's values in each window; starts before 5 s are in the table alone")
         .panel_size_px(420.0, 260.0)
         .panel(panel("(a) efficiency over the duration (from 10 s)", duration, eta_axis, durations, eta, Some(1.0)))
-        .panel(panel("(b) efficiency over the start (100 s long)", offset, eta_axis, &shown, eta, Some(1.0)))
+        .panel(panel("(b) efficiency over the start (100 s long)", offset, eta_axis, shown, eta, Some(1.0)))
         .panel(panel("(a) h over the duration (from 10 s)", duration, h_axis, durations, h, None))
-        .panel(panel("(b) h over the start (100 s long)", offset, h_axis, &shown, h, None))
+        .panel(panel("(b) h over the start (100 s long)", offset, h_axis, shown, h, None))
         .to_svg()
 }

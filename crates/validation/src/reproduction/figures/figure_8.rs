@@ -20,9 +20,7 @@ const SHOWN: f64 = 0.2;
 
 struct Case {
     alpha: f64,
-    /// Identified with the true alpha_A.
     right: Vec<Outcome>,
-    /// Identified with alpha_A = 0.
     wrong: Vec<Outcome>,
 }
 
@@ -39,8 +37,7 @@ fn cases() -> Result<Vec<Case>, ReproduceError> {
         .collect()
 }
 
-/// A machine whose h before the wheel follows from the diameter of the inlet (Appendix A), identified with a single h in eqs. 1 and 3 as in
-/// the paper, and with the correlation of Appendix A.
+/// A machine whose h before the wheel follows from the inlet diameter, identified with a single h, and with the correlation of Appendix A.
 struct OwnInlet {
     /// Known alpha_A, a single h.
     right: Vec<Outcome>,
@@ -95,12 +92,8 @@ fn statements_on_h(
                 fixed(own_grows, 1),
                 nearer((own_grows - 1.0).abs() < (shared_grows - 1.0).abs())
             ),
-            match (slightly(shared_grows), slightly(own_grows)) {
-                (true, _) => Verdict::Holds,
-                // With the correlation of Appendix A, which eqs. 1 and 3 omit.
-                (false, true) => Verdict::Partly,
-                (false, false) => Verdict::Differs,
-            },
+            // In part with the correlation of Appendix A, which eqs. 1 and 3 omit.
+            Verdict::of(slightly(shared_grows), slightly(own_grows)),
         ),
         Statement::new(
             "Abstract: with a wrong alpha_A the error of the heat-transfer coefficient increases to 20 %.",
@@ -111,11 +104,7 @@ fn statements_on_h(
                 fixed((to_20(wrong) - to_20(&own_inlet_fit.wrong)).abs(), 1),
                 nearer(to_20(&own_inlet_fit.wrong) < to_20(wrong))
             ),
-            if off(&own_inlet_fit.wrong) < ABSTRACT_PERCENT && ABSTRACT_PERCENT < off(wrong) {
-                Verdict::Partly
-            } else {
-                Verdict::Differs
-            },
+            Verdict::of(false, off(&own_inlet_fit.wrong) < ABSTRACT_PERCENT && ABSTRACT_PERCENT < off(wrong)),
         ),
         Statement::new(
             "One coefficient before and behind the wheel is not correct: with the right alpha_A an average is identified that is not the model's, as the comparison of 8 (b) with 6 (b) shows.",
@@ -165,20 +154,13 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
                 range(wrong_three, 1),
                 range(extremes(wrong_errors()), 1)
             ),
-            match wrong_three {
-                // The identified efficiency is too low: heat before compression makes the same work look larger.
-                Some((low, high)) if low > -16.0 && high < -7.0 => Verdict::Holds,
-                _ => Verdict::Partly,
-            },
+            // The identified efficiency is too low: heat before compression makes the same work look larger.
+            Verdict::of(wrong_three.is_some_and(|(low, high)| low > -16.0 && high < -7.0), true),
         ),
         Statement::new(
             "Up to 10 points at 150 krpm.",
             format!("{} points at 150 krpm.", range(at_150, 1)),
-            match at_150 {
-                Some((low, _)) if low > -11.0 => Verdict::Holds,
-                Some((_, high)) if high > -11.0 => Verdict::Partly,
-                _ => Verdict::Differs,
-            },
+            Verdict::of(at_150.is_some_and(|r| r.0 > -11.0), at_150.is_some_and(|r| r.1 > -11.0)),
         ),
         Statement::new(
             "With the correct alpha_A an almost perfect estimate of the efficiency is obtained.",

@@ -55,6 +55,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
     let h_small = extremes(small().flat_map(|case| case.outcomes.iter().map(Outcome::h_error_percent)));
     let h_thick = extremes(thick_outcomes.iter().map(Outcome::h_error_percent));
     let tau = thick.and_then(|case| case.time_constants_s);
+    let is_largest_in = |range_s: std::ops::Range<f64>| tau.is_some_and(|(_, high)| range_s.contains(&high));
     let statements = vec![
         Statement::new(
             "Thermocouples of 0.5 and 1.5 mm: the efficiency is within 1 point.",
@@ -74,11 +75,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
                 range(slow_range, 1),
                 slow.len()
             ),
-            match (slow_failed, slow_bad) {
-                (failed, _) if failed == slow.len() => Verdict::Holds,
-                (0, 0) => Verdict::Differs,
-                _ => Verdict::Partly,
-            },
+            Verdict::of(slow_failed == slow.len(), slow_failed + slow_bad > 0),
         ),
         Statement::new(
             "3 mm: much larger errors, over 10 points, especially at low speed.",
@@ -97,11 +94,7 @@ pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
         Statement::new(
             "Time constants can be as large as 10 s for a 3 mm thermocouple (section 4.1).",
             format!("{} s for 3 mm over these runs.", range(tau, 1).replace('+', "")),
-            match tau {
-                Some((_, high)) if (9.0..12.0).contains(&high) => Verdict::Holds,
-                Some((_, high)) if (5.0..20.0).contains(&high) => Verdict::Partly,
-                _ => Verdict::Differs,
-            },
+            Verdict::of(is_largest_in(9.0..12.0), is_largest_in(5.0..20.0)),
         ),
     ];
     let mut table = Table::new([

@@ -3,7 +3,6 @@
 pub(crate) mod figure_10;
 pub(crate) mod figure_11;
 pub(crate) mod figure_12;
-pub(crate) mod figure_13;
 pub(crate) mod figure_2;
 pub(crate) mod figure_5;
 pub(crate) mod figure_6;

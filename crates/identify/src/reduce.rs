@@ -46,9 +46,6 @@ pub struct KnownHeat<'a> {
 
 /// Points and budgets of steady points, in order. `config.method` says whether their heat is removed, which needs `heat` and a housing
 /// temperature or T3 at every point; see [`method_of_table`].
-///
-/// # Errors
-/// [`IdentifyError`] if the configuration is out of range.
 pub fn reduce(
     measured: &[MeasuredPoint],
     heat: Option<KnownHeat<'_>>,

@@ -46,7 +46,6 @@ pub struct RigWithInstruments {
     rig_last_s: Option<f64>,
 }
 
-/// An auxiliary instrument failed.
 #[derive(Debug, thiserror::Error)]
 #[error("the reader `{name}`: {message}")]
 struct InstrumentError {
@@ -134,7 +133,6 @@ impl RigWithInstruments {
         merged
     }
 
-    /// Disconnects all instruments that were connected.
     fn disconnect(&mut self) {
         // Errors while disconnecting are ignored: the rig is released anyway.
         self.sources.iter_mut().for_each(|source| drop(source.link.disarm()));
@@ -308,7 +306,6 @@ fn resample_truth(rig: &SampleBatch, t_s: &[f64]) -> Vec<TruthColumn> {
     rig.truth.iter().map(column).collect()
 }
 
-/// Adds the wanted channels of one source to the merged batch.
 fn add_channels(
     merged: &mut SampleBatch,
     part: SampleBatch,
@@ -341,7 +338,6 @@ pub(crate) enum Call {
     Disarm,
 }
 
-/// Connection to the backend of an instrument.
 pub(crate) enum InstrumentLink {
     /// Called directly: in simulated time all sources wait for each other.
     Direct { backend: Box<dyn Backend>, answer: Option<Answer> },
@@ -349,7 +345,6 @@ pub(crate) enum InstrumentLink {
     OwnThread {
         calls: Sender<Call>,
         answers: Receiver<Answer>,
-        /// A request is pending.
         is_pending: bool,
         armed: bool,
         deadline: Duration,
@@ -404,7 +399,6 @@ impl InstrumentLink {
         }
     }
 
-    /// The answer, if it has arrived.
     pub(crate) fn answer(&mut self) -> Option<Answer> {
         match self {
             InstrumentLink::Direct { answer, .. } => answer.take(),

@@ -194,12 +194,10 @@ pub(crate) struct RestWatch {
     block_end_s: Option<f64>,
     /// Sums and counts of the current block.
     sums: [(f64, usize); WATCHED.len()],
-    /// The last means.
     means: VecDeque<[f64; WATCHED.len()]>,
 }
 
 impl RestWatch {
-    /// Receives the samples of the soak.
     pub(crate) fn on_batch(&mut self, batch: &SampleBatch) {
         let columns = WATCHED.map(|channel| batch.columns.iter().find(|column| column.channel == channel));
         for (index, t_s) in batch.t_s.iter().enumerate() {

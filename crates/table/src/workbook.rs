@@ -114,9 +114,6 @@ pub struct SheetRows<'a> {
 
 impl SheetRows<'_> {
     /// Advances to the next row with a cell; `false` after the last one.
-    ///
-    /// # Errors
-    /// A clause with the problem, about the file.
     pub fn advance(&mut self) -> Result<bool, String> {
         self.row.clear();
         let mut current = None;

@@ -33,10 +33,6 @@ pub struct ScriptEffect {
 
 impl ScriptEffect {
     /// Reads a script; messages contain `path`.
-    ///
-    /// # Errors
-    /// [`ScriptEffectError`] with the line: a header without id, submodel or parameter, a mistake in the script, or a script
-    /// without hooks.
     pub fn new(text: &str, path: &Path) -> Result<Self, ScriptEffectError> {
         let fail = |line: Option<usize>, message: String| ScriptEffectError::new(path, text, line, message);
         if text.len() > MAX_SCRIPT_BYTES {

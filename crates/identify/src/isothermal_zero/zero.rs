@@ -105,9 +105,6 @@ pub enum NoZero {
 /// non-uniformity. Sensors that do not rest, or that do not agree although they are not T1, T2, P1 or P2, are left out. If a fault is allowed, a
 /// temperature sensor that exceeds its declared offset is compared with the others; if two pressure taps differ by more, either may be wrong, so
 /// both keep their declared offsets.
-///
-/// # Errors
-/// [`NoZero`] if the recording has no soak, or an unsuitable one.
 pub fn isothermal_zero(
     recording: &Recording,
     config: &IdentifyConfig,
@@ -202,7 +199,6 @@ fn used_s(soak_s: f64, settings: &ZeroSettings) -> f64 {
     (0.5 * soak_s).min(settings.longest_s).max(settings.shortest_s)
 }
 
-/// A recording during its soak.
 struct SoakReadings<'a> {
     recording: &'a Recording,
     config: &'a IdentifyConfig,

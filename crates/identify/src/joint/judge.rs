@@ -108,7 +108,6 @@ pub(crate) fn exclude(problem: &mut Problem<'_>, config: &IdentifyConfig) {
     }
 }
 
-/// Verdict on one step.
 pub(crate) fn judge_step(
     problem: &Problem<'_>,
     (index, whitened): (usize, &[f64]),
@@ -178,9 +177,7 @@ const SHARES: [f64; 2] = [1.0 / 6.0, 1.0 / 3.0];
 
 /// Steps at one end of the map.
 pub(crate) struct Region {
-    /// The end.
     pub(crate) region: MapRegion,
-    /// Indices of the steps.
     pub(crate) steps: Vec<usize>,
 }
 

@@ -77,7 +77,6 @@ pub(crate) fn alone<S: Sync, E: Sync>(
     parallel::map(&positions, of).into_iter().unzip()
 }
 
-/// Identifies the step at `position`.
 pub(crate) fn estimate(
     recording: &Recording,
     position: usize,
@@ -176,7 +175,6 @@ fn uncertainties(
     })
 }
 
-/// A fit with its data.
 struct View<'a> {
     fit: &'a Fit,
     samples: &'a Samples,

@@ -26,7 +26,6 @@ pub(crate) fn apparent_eta(row: &Row, air: Air) -> f64 {
     apparent_efficiency(row.p2_pa / row.p1_pa, row.t1_k, row.t2_k, air)
 }
 
-/// Identifies the step at `position`.
 pub(crate) fn estimate(
     recording: &Recording,
     position: usize,

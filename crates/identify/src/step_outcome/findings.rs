@@ -22,7 +22,6 @@ impl Findings {
         self.warnings.push(warning);
     }
 
-    /// Adds the findings of another check.
     pub(crate) fn take(&mut self, other: Findings) {
         let mut doubts = other.warnings;
         self.warnings.extend(doubts.split_off(other.doubts));

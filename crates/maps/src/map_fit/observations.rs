@@ -58,7 +58,6 @@ impl Observation {
     }
 }
 
-/// All points of a map.
 #[derive(Debug, Clone)]
 pub(crate) struct Observations {
     /// Unit of speed ratios, rpm.
@@ -133,7 +132,6 @@ impl Observations {
         Ok(all)
     }
 
-    /// The observations without one line.
     pub(crate) fn without_line(&self, line: usize) -> Result<Self, MapFitError> {
         let mut lines_rpm = self.lines_rpm.clone();
         lines_rpm.remove(line);

@@ -20,7 +20,6 @@ const MAX_ATTEMPTS: usize = 3;
 /// Time between two of these commands, s of the run's clock: an interrupted link may recover.
 const PAUSE_S: f64 = 0.5;
 
-/// A panic of the backend, as its error.
 #[derive(Debug, thiserror::Error)]
 #[error("the backend failed: {0}")]
 struct PanicError(String);

@@ -51,9 +51,6 @@ fn is_descriptor(path: &Path) -> bool {
 }
 
 /// Reads a file of at most `limit_bytes`. Memory is bounded even if the file reports a wrong size.
-///
-/// # Errors
-/// The system's error; [`io::ErrorKind::FileTooLarge`] for a larger file.
 pub fn read_limited(path: &Path, limit_bytes: usize) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let is_stream = is_descriptor(path) && !std::fs::metadata(path)?.is_file();

@@ -55,7 +55,6 @@ impl Instant<'_> {
     }
 }
 
-/// All sensors, with the state of their dynamics.
 #[derive(Debug)]
 pub(crate) struct SensorBank {
     pub(crate) sensors: Vec<(Channel, Sensor)>,
@@ -68,7 +67,6 @@ pub(crate) struct SensorBank {
     pub(crate) resonator: Resonator,
 }
 
-/// Collects samples into columns.
 pub(crate) struct SampleCollector {
     first_sequence: u64,
     t_s: Vec<f64>,
@@ -88,7 +86,6 @@ impl SampleCollector {
         }
     }
 
-    /// Number of samples so far.
     pub(crate) fn len(&self) -> usize {
         self.t_s.len()
     }

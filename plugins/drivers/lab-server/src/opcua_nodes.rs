@@ -66,7 +66,6 @@ impl Shared {
         })
     }
 
-    /// Prints a timestamped line.
     fn stamp(&self, message: impl std::fmt::Display) {
         if self.stamps {
             let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);

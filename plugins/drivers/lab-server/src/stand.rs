@@ -98,9 +98,6 @@ impl Stand {
     }
 
     /// Writes a value.
-    ///
-    /// # Errors
-    /// [`RefusedValue`] if the stand refuses the value; its state is unchanged then.
     pub fn write(&mut self, target: Target, value: f64) -> Result<(), RefusedValue> {
         let switch = SetpointRange { low: 0.0, high: 1.0 };
         let range = match target {

@@ -35,7 +35,6 @@ pub struct Actuator {
     command: f64,
 }
 
-/// The motion from one command to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Motion {
     /// Its start, s.

@@ -13,7 +13,6 @@ use rand_pcg::Pcg64;
 use serde::Deserialize;
 use std::sync::Arc;
 
-/// A slow sine wave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Wave {
     amplitude: f64,

@@ -46,13 +46,6 @@ pub struct RigWithInstruments {
     rig_last_s: Option<f64>,
 }
 
-#[derive(Debug, thiserror::Error)]
-#[error("the reader `{name}`: {message}")]
-struct InstrumentError {
-    name: String,
-    message: String,
-}
-
 impl RigWithInstruments {
     /// `rig` with the auxiliary instruments `readers`. In simulated time each instrument is polled together with the rig. Otherwise each
     /// has its own thread, and `deadline` to connect.
@@ -190,8 +183,7 @@ impl Backend for RigWithInstruments {
         for index in 0..self.sources.len() {
             let Some(source) = self.sources.get_mut(index) else { break };
             if let Err(error) = source.link.arm() {
-                let source =
-                    Box::new(InstrumentError { name: source.name.clone(), message: error.to_string() });
+                let source = format!("the reader `{}`: {error}", source.name).into();
                 self.disconnect();
                 return Err(BackendError::Lost { t_s: 0.0, source });
             }

@@ -58,10 +58,7 @@ pub fn check(
     })
 }
 
-/// Like [`check`], with another criterion for reachable points.
-///
-/// # Errors
-/// All mistakes of the text; points are checked only if there are no others.
+/// Like [`check`], with another criterion for reachable points. Points are checked only if there are no other mistakes.
 pub fn check_with(
     text: &str,
     origin: &Path,

@@ -140,10 +140,8 @@ impl Obstacle {
     }
 }
 
-/// Solves the steady state of the nominal machine at `point`, whose valve opening replaces that of `boundary`.
-///
-/// # Errors
-/// All reasons why the point cannot be reached, at least one.
+/// Solves the steady state of the nominal machine at `point`, whose valve opening replaces that of `boundary`; or all reasons
+/// why it cannot be reached.
 pub fn reach(
     model: &Model,
     point: OperatingPoint,

@@ -318,10 +318,7 @@ pub enum EffectError {
 }
 
 /// Adds `effect` to `rig`, after the effects already there; effects compose in any number and order.
-///
-/// # Errors
-/// [`EffectError`] if a value is missing, out of range or not finite, or there are too many hidden temperatures. The rig
-/// is then unchanged.
+/// After an error the rig is unchanged.
 pub fn add(rig: &mut Rig, effect: &dyn Effect, values: &[f64]) -> Result<(), EffectError> {
     effect.prepare(&NamedValues::new(effect.info(), values)?, rig)
 }

@@ -345,9 +345,7 @@ fn quantity(description: &str, example: &str) -> Value {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum MappedQuantity {
-    /// A channel.
     Channel(Channel),
-    /// One of several sensors of a channel.
     Element(Element),
 }
 

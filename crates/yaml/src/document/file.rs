@@ -7,9 +7,6 @@ use std::io::{ErrorKind, Read, Seek};
 use std::path::Path;
 
 /// Opens a plain file: the one place where files that a user names are opened. A pipe or a device is not opened: reading it may hang or never end.
-///
-/// # Errors
-/// The system's error; [`io::ErrorKind::InvalidInput`] with a remedy if it is not a file.
 pub fn open_file(path: &Path) -> io::Result<File> {
     let refused = |why: &str| Err(io::Error::new(ErrorKind::InvalidInput, why));
     let mut options = OpenOptions::new();

@@ -238,7 +238,6 @@ const FROM_OUTPUTS: [(&str, &str, Reader); 11] = [
     ("turbine_heat_w", "W", |outputs| outputs.turbine.heat_w),
 ];
 
-/// Collects truth into columns.
 #[derive(Debug, Default)]
 pub struct TruthRecorder {
     from_outputs: [Vec<f64>; FROM_OUTPUTS.len()],
@@ -268,7 +267,6 @@ impl TruthRecorder {
         self.turbine_efficiency.push(turbine_efficiency);
     }
 
-    /// The columns.
     pub fn finish(self) -> Vec<TruthColumn> {
         let column = |name: &str, unit: &str, values| TruthColumn {
             name: name.to_owned(),

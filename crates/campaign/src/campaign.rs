@@ -242,9 +242,6 @@ pub(crate) struct CampaignFile {
 impl CampaignFile {
     /// The campaign of a file without mistakes, and the position of each point in the file. Each line has only its first point: the others
     /// need the nominal model.
-    ///
-    /// # Errors
-    /// An error if the map file or the sequence script can no longer be read.
     pub(crate) fn campaign(
         self,
         origin: &Path,

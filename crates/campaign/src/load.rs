@@ -33,9 +33,6 @@ pub enum CampaignError {
 }
 
 /// Reads and checks a campaign file and the files it names.
-///
-/// # Errors
-/// [`CampaignError::Read`] if the file cannot be read, [`CampaignError::Mistakes`] with all its mistakes.
 pub fn load(path: &Path) -> Result<Campaign, CampaignError> {
     let mistakes = |findings| CampaignError::Mistakes(Box::new(findings));
     let text = mapper_yaml::open(&DOCUMENT, path, MAX_FILE_BYTES)
@@ -48,9 +45,6 @@ pub fn load(path: &Path) -> Result<Campaign, CampaignError> {
 /// files it names.
 ///
 /// The steady states of the nominal model determine which points can be reached; see [`check_with`] for another criterion.
-///
-/// # Errors
-/// All mistakes of the text together.
 pub fn check(
     text: &str,
     origin: &Path,
@@ -64,10 +58,7 @@ pub fn check(
     })
 }
 
-/// Like [`check`], with another criterion for reachable points.
-///
-/// # Errors
-/// All mistakes of the text; points are checked only if there are no others.
+/// Like [`check`], with another criterion for reachable points. Points are checked only if there are no other mistakes.
 pub fn check_with(
     text: &str,
     origin: &Path,
@@ -254,9 +245,6 @@ fn report_wrong_limits(
 }
 
 /// A file that a campaign names, as text: of a workbook its first visible sheet with numbers, of a compressed file its content.
-///
-/// # Errors
-/// The system's error; [`io::ErrorKind::InvalidData`] for a file that is neither.
 pub fn read_named_file(path: &Path) -> io::Result<String> {
     match String::from_utf8(mapper_yaml::read_limited(path, MAX_MAP_BYTES)?) {
         Ok(text) => Ok(without_mark(text)),
@@ -266,10 +254,6 @@ pub fn read_named_file(path: &Path) -> io::Result<String> {
 }
 
 /// A file that a campaign names, or a campaign itself, as text.
-///
-/// # Errors
-/// The system's error; [`io::ErrorKind::FileTooLarge`] for a file above the size limit, [`io::ErrorKind::InvalidData`] for one that
-/// is not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
     String::from_utf8(mapper_yaml::read_limited(path, MAX_MAP_BYTES)?)
         .map(without_mark)

@@ -102,10 +102,6 @@ struct GroupFile {
 }
 
 /// Loads a nightly campaign, without the campaign files in it.
-///
-/// # Errors
-/// [`NightlyError::Read`] if the file cannot be read; [`NightlyError::Mistakes`] if it has unknown or missing
-/// keys, or requests no run, a campaign twice, or more than 10 000 runs.
 pub fn load_nightly(path: &Path) -> Result<Nightly, NightlyError> {
     let mistakes = |findings| NightlyError::Mistakes(Box::new(findings));
     let text = mapper_yaml::open(&DOCUMENT, path, MAX_FILE_BYTES)

@@ -4,9 +4,6 @@ use crate::units::{Dimension, Quantity};
 use serde::{Deserialize, Deserializer};
 
 /// For `deserialize_with`, together with `default`: an optional key.
-///
-/// # Errors
-/// The deserialiser's error, if the text is not a value of the dimension.
 pub(crate) fn optional_si<'de, D: Dimension, S: Deserializer<'de>>(
     deserializer: S,
 ) -> Result<Option<f64>, S::Error> {

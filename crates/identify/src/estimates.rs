@@ -17,7 +17,6 @@ use mapper_inference::hypotheses::{Likelihood, Priors};
 
 /// The estimate of each step, in order, with everything that was found about it.
 pub(crate) struct Estimated {
-    /// End state and findings of each step.
     pub(crate) steps: Vec<(Result<EndState, StepError>, Findings)>,
     pub(crate) estimates: Vec<Estimate>,
     pub(crate) thermal: Option<ThermalModel>,

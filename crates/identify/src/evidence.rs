@@ -8,15 +8,11 @@ use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, StepError};
 use mapper_core::{Channel, Event, EventKind, Recording, StepMarker, Warning};
 
-/// The evidence of each step, in order.
 pub(crate) struct Evidence {
-    /// State at the end of each step.
     pub(crate) states: Vec<Result<EndState, StepError>>,
-    /// What was found in each step.
     pub(crate) findings: Vec<Findings>,
     /// Fit of each step alone, with its findings; empty without housing temperature.
     pub(crate) alone: (Vec<Estimate>, Vec<Findings>),
-    /// Checks of the readings that failed.
     pub(crate) failed_checks: Vec<FailedCheck>,
     /// Ends of the steps that no check refused.
     pub(crate) ends: Vec<Option<Ends>>,
@@ -59,7 +55,6 @@ impl Evidence {
             .all(|step| self.failed_checks.iter().any(|failed_check| failed_check.steps.contains(&step)))
     }
 
-    /// The known end states.
     pub(crate) fn known(&self) -> Vec<Option<EndState>> {
         self.states.iter().map(|state| state.as_ref().ok().copied()).collect()
     }

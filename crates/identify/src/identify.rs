@@ -19,9 +19,6 @@ use mapper_core::{IdentifiedPoint, PointBudgets, Recording, ThermalModel, Turbin
 ///
 /// The state of a point (speed, flow, pressure ratio, T1, P1) is the mean over the last
 /// [`end_mean_s`](crate::Thresholds::end_mean_s) of its step.
-///
-/// # Errors
-/// [`IdentifyError`] if a channel that the method needs is missing, the recording has no steps, or the configuration is out of range.
 pub fn identify(
     recording: &Recording,
     config: &IdentifyConfig,

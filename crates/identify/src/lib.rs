@@ -47,9 +47,9 @@ pub use isothermal_zero::groups::ZeroSettings;
 pub use isothermal_zero::periodic::PeriodicError;
 pub use isothermal_zero::references::CellReference;
 pub use isothermal_zero::zero::{
-    IsothermalZero, LeftOutSensor, NoZero, NotZeroed, expected_after_zero, isothermal_zero, zeroed,
+    IsothermalZero, LeftOutSensor, NoZero, NotZeroed, ZeroOutcome, expected_after_zero, isothermal_zero,
+    zeroed,
 };
-pub use isothermal_zero::zero_outcome::ZeroOutcome;
 pub use joint::expected::expected_together;
 pub use joint::step_model::rows::BLOCK_S;
 pub use joint::{DynamicEfficiency, MAX_PRIOR_SENSITIVITY_ETA};

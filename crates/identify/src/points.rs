@@ -11,7 +11,6 @@ use mapper_core::{
     confidence_interval_95,
 };
 
-/// The points, and the budgets of those that there are.
 pub(crate) fn points_with_budgets(
     recording: &Recording,
     found: Vec<(Result<EndState, StepError>, Findings)>,
@@ -36,7 +35,6 @@ pub(crate) fn points_with_budgets(
     (points, all)
 }
 
-/// One point.
 pub(crate) fn point(
     step: &StepMarker,
     state: &EndState,

@@ -9,8 +9,7 @@ use crate::single_step::budgets;
 use crate::single_step::dynamic::{Estimate, judge_assumption};
 use crate::single_step::fit::ETA_BOUNDS;
 use crate::step_data::end_state::EndState;
-use crate::step_outcome::findings::Findings;
-use crate::step_outcome::interval_width;
+use crate::step_outcome::findings::{Findings, wide_interval};
 use crate::{IdentifyConfig, IdentifyError};
 use mapper_core::{
     Channel, EstimateUncertainty, EtaSignal, IdentifiedPoint, MeasuredPoint, Method, ModelTolerances,
@@ -46,9 +45,6 @@ pub struct KnownHeat<'a> {
 
 /// Points and budgets of steady points, in order. `config.method` says whether their heat is removed, which needs `heat` and a housing
 /// temperature or T3 at every point; see [`method_of_table`].
-///
-/// # Errors
-/// [`IdentifyError`] if the configuration is out of range.
 pub fn reduce(
     measured: &[MeasuredPoint],
     heat: Option<KnownHeat<'_>>,
@@ -161,7 +157,7 @@ fn estimate(
     }
     if known_square.sqrt() > config.thresholds.sigma_eta {
         let signal = EtaSignal::Settled { rise_k: t2_k - measured.t1_k };
-        findings.doubt(interval_width::wide(uncertainty, signal));
+        findings.doubt(wide_interval(uncertainty, signal));
     }
     match heat {
         Some(heat) => {

@@ -23,10 +23,6 @@ use serde::Serialize;
 /// flow and pressure ratio, without `eta`.
 ///
 /// `reference` is the reference state of the points' corrected quantities, `method` the method that identified all of them.
-///
-/// # Errors
-/// [`AssembleError`]: no points; a point whose corrected flow, corrected speed or pressure ratio is not finite;
-/// points of another method.
 pub fn assemble(
     points: &[IdentifiedPoint],
     machine: &str,

@@ -75,11 +75,6 @@ pub fn correlate(t_s: &[f64], x: &[f64], time_constant_s: f64) -> Vec<f64> {
     sums
 }
 
-/// Minimum share of white noise in the variance of a sample. Bound: never zero, since a filter that trusts each row completely is useless.
-const MIN_WHITE_OF_SAMPLE_RATIO: f64 = 1e-3;
-/// Minimum share of white noise in the variance of a mean. Bound: as for a sample; a mean over a short block has more.
-const MIN_WHITE_RATIO: f64 = 0.02;
-
 /// Kalman filter that whitens columns row by row.
 #[derive(Debug, Clone, Default)]
 pub struct WhiteningFilter {
@@ -96,23 +91,6 @@ pub struct BlockNoise {
     pub white: f64,
     /// First-order part.
     pub first_order: f64,
-}
-
-impl BlockNoise {
-    /// Noise of the mean of `samples` readings over `block_s`; each reading has variance 1.
-    ///
-    /// The first-order part has the covariance [`crate::coloured_noise::block_covariance`] between blocks.
-    /// The white part is reduced so that the total variance of the mean is correct.
-    pub fn of_mean(noise: ColouredNoise, samples: f64, block_s: f64) -> Self {
-        let share = noise.first_order_variance_ratio();
-        let white = noise.white_variance_ratio() / samples.max(1.0);
-        if block_s / noise.time_constant_s < CONSTANT_BELOW || samples < 2.0 {
-            return BlockNoise { white: white.max(MIN_WHITE_OF_SAMPLE_RATIO), first_order: share };
-        }
-        let first_order = crate::coloured_noise::block_covariance(share, block_s, noise.time_constant_s);
-        let own = crate::coloured_noise::variance_of_mean(share, block_s, noise.time_constant_s);
-        BlockNoise { white: (white + own - first_order).max(MIN_WHITE_RATIO * (white + own)), first_order }
-    }
 }
 
 impl WhiteningFilter {
@@ -163,8 +141,6 @@ impl WhiteningFilter {
 /// Length in time constants below which the series of the mean's variance replaces the formula, which subtracts nearly equal numbers. Bound:
 /// the series is accurate to 1e-14 there.
 const SERIES_BELOW: f64 = 0.02;
-/// Length below which the factor of the covariance is 1. Bound: the next term of its series is x^2 / 12.
-const CONSTANT_BELOW: f64 = 1e-4;
 
 /// Correlation of two values of the process `apart_s` apart; 0 for a process without memory.
 pub fn memory(apart_s: f64, time_constant_s: f64) -> f64 {
@@ -188,19 +164,6 @@ pub fn variance_of_mean(variance: f64, length_s: f64, time_constant_s: f64) -> f
         return variance * series.into_iter().fold(0.0, |sum, term| sum * x + term);
     }
     variance * 2.0 * (x - 1.0 + (-x).exp()) / (x * x)
-}
-
-/// Factor of the covariance of the process's means over two blocks of `length_s` each: blocks `k` apart (at least 1) have the
-/// covariance `block_covariance * memory(k * length_s)`.
-///
-/// `variance * (2 cosh(x) - 2) / x^2` with `x` the length in time constants. In the unit of `variance`; it grows
-/// without bound with the length, as the memory falls. For a time constant of 0 it is infinite.
-pub fn block_covariance(variance: f64, length_s: f64, time_constant_s: f64) -> f64 {
-    let x = length_s / time_constant_s;
-    if x < CONSTANT_BELOW {
-        return variance;
-    }
-    variance * (2.0 * x.cosh() - 2.0) / (x * x)
 }
 
 /// Distance in time constants beyond which correlation is neglected. Bound: it is then below 6e-6.
@@ -369,16 +332,6 @@ mod tests {
         assert!((filter.ln_spreads - 0.5 * covariance.determinant().ln()).abs() < 1e-12);
     }
 
-    #[test]
-    fn a_row_has_the_variance_of_its_mean() {
-        let noise = ColouredNoise::new(0.6, 2.0);
-        let row = BlockNoise::of_mean(noise, 5.0, 0.5);
-        assert!((row.white + row.first_order - noise.variance_of_mean(5, 0.5)).abs() < 1e-15);
-        // A single sample has all of it.
-        let single = BlockNoise::of_mean(noise, 1.0, 0.5);
-        assert!((single.white + single.first_order - 1.0).abs() < 1e-15);
-    }
-
     /// The double integral by scipy, half of it by symmetry: `2*scipy.integrate.dblquad(lambda t, s: numpy.exp(-(s-t)/2), 0, L,
     /// 0, lambda s: s, epsabs=1e-15, epsrel=1e-13)[0]/L**2` for L = 0.02, 1, 30 s.
     #[test]
@@ -400,17 +353,6 @@ mod tests {
         // Series and formula meet where the one follows the other; the formula has 1e-12 there.
         let (below, above) = (variance_of_mean(1.0, 0.02 - 1e-13, 1.0), variance_of_mean(1.0, 0.02, 1.0));
         assert!((below - above).abs() < 2e-12, "{below} {above}");
-    }
-
-    /// The variance of the mean over two blocks is that over the whole.
-    #[test]
-    fn two_blocks_make_one_of_twice_the_length() {
-        for length_s in [0.1, 1.0, 4.0] {
-            let own = variance_of_mean(1.0, length_s, 2.0);
-            let mixed = block_covariance(1.0, length_s, 2.0) * memory(length_s, 2.0);
-            let whole = variance_of_mean(1.0, 2.0 * length_s, 2.0);
-            assert!((0.5 * (own + mixed) - whole).abs() < 1e-12, "{length_s}");
-        }
     }
 
     #[test]

@@ -202,13 +202,11 @@ impl Judge<'_> {
         None
     }
 
-    /// Noise of the mean of a block.
     fn block_sigma(&self, index: usize) -> f64 {
         let variance = self.colour.variance_of_mean(self.blocks.samples[index], self.blocks.length_s);
         self.declared.elements[index].declared.noise_sigma * variance.sqrt()
     }
 
-    /// Difference of a sensor from the others in use.
     fn difference(&self, index: usize, in_use: &[usize]) -> Option<Difference> {
         let weights = self.declared.weights(|other| other != index && in_use.contains(&other));
         let reference = self.blocks.weighted(&weights);
@@ -351,7 +349,6 @@ impl Blocks {
         Some(Blocks { start_s, length_s, means, samples })
     }
 
-    /// Number of blocks.
     pub(crate) fn count(&self) -> usize {
         self.means.first().map_or(0, Vec::len)
     }

@@ -163,7 +163,6 @@ struct Jumps<'a> {
     table: &'a Table,
     values: &'a [f64],
     commands: Vec<(f64, f64)>,
-    /// Starts of the steps with a jump, s.
     starts_s: Vec<f64>,
     sizes: Vec<f64>,
     /// Time after a jump that is compared, s.
@@ -290,7 +289,6 @@ impl<'a> Jumps<'a> {
     }
 }
 
-/// The fit of one response to all jumps.
 struct ResponseFit<'j, 'a> {
     jumps: &'j Jumps<'a>,
     drive: Response,
@@ -426,9 +424,6 @@ pub struct OtherMachine {
 ///
 /// A missing entry is not a contradiction: recordings by other programs seldom name their machine, and a campaign without a serial number
 /// applies to every machine of its name.
-///
-/// # Errors
-/// [`OtherMachine`] if both sides name a machine or a serial number and the two differ.
 pub fn same_machine(
     recorded: &BTreeMap<String, String>,
     machine_name: &str,

@@ -96,7 +96,6 @@ pub(crate) fn value_k<C: Chain>(chain: &C, from: usize, to: usize, gradient_k: f
     if is_forbidden { size_k - FORBIDDEN_PENALTY_K } else { size_k }
 }
 
-/// Sum of the values of an order, K.
 pub(crate) fn sum_k<C: Chain>(chain: &C, order: &[usize]) -> f64 {
     let Some(&first) = order.first() else { return 0.0 };
     let (mut state, mut sum_k) = (chain.first(first), 0.0);
@@ -241,7 +240,6 @@ impl Housing {
     }
 }
 
-/// The steady states of the slowest and the fastest point.
 fn slowest_and_fastest(targets: &[SteadyState]) -> Option<[&SteadyState; 2]> {
     let by_speed =
         |a: &&SteadyState, b: &&SteadyState| a.state.shaft_speed_rad_s.total_cmp(&b.state.shaft_speed_rad_s);

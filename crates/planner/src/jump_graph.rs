@@ -112,7 +112,6 @@ impl fmt::Display for SeparatePoints {
 }
 
 impl JumpGraph {
-    /// The graph in which every jump is allowed.
     pub(crate) fn complete(points: &[OperatingPoint]) -> Self {
         let speeds = || points.iter().map(|point| point.speed_rpm);
         let range_rpm = speeds().fold(0.0, f64::max) - speeds().fold(f64::INFINITY, f64::min);
@@ -141,7 +140,6 @@ impl JumpGraph {
         self.allowed.contains_edge(from, to)
     }
 
-    /// The forbidden jumps.
     pub(crate) fn forbidden(&self) -> impl Iterator<Item = (usize, usize)> {
         self.forbidden.keys().copied()
     }
@@ -154,9 +152,6 @@ impl JumpGraph {
 
     /// The rank of each point in an order that reaches all of them, over other points if necessary; points that allowed jumps connect in
     /// both directions have equal rank.
-    ///
-    /// # Errors
-    /// The points that no order reaches with the others.
     pub(crate) fn ranks(&self) -> Result<Vec<usize>, Vec<SeparatePoints>> {
         // Strongly connected components; allowed jumps lead only to components further in front.
         let components = tarjan_scc(&self.allowed);

@@ -20,9 +20,6 @@ const FIRST_DWELL_S: f64 = 40.0;
 const MAX_FORECASTS: usize = 8;
 
 /// Orders the points and forecasts every step.
-///
-/// # Errors
-/// [`PlanError`] with all unreachable points and the limits that they violate, or with the step whose forecast failed.
 pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
     if request.points.is_empty() {
         return Err(PlanError::NoPoints);
@@ -57,7 +54,6 @@ fn plan_with_return(
     Ok(plan)
 }
 
-/// Makes the plan with the requested repeats.
 fn plan_with_repeats(
     request: &PlanRequest<'_>,
     targets: &[SteadyState],

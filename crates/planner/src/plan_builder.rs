@@ -249,7 +249,6 @@ impl<'a> PlanBuilder<'a> {
         with_visits.reduce(better).map(|(_, best)| best)
     }
 
-    /// The visits of an order.
     fn visits(&self, housing: &Housing, order: &[usize]) -> Vec<Visit> {
         let mut visits = match self.repeated {
             Some(jump) => insert_repeats(housing, order, jump),
@@ -277,7 +276,6 @@ impl<'a> PlanBuilder<'a> {
         Ok(Draft { dwell_s, steps, parameter_error, ..draft })
     }
 
-    /// Completes the plan with its figures and remarks.
     pub(crate) fn plan(&self, draft: Draft) -> Result<Plan, PlanError> {
         let request = self.request;
         let timing = request.timing;

@@ -173,7 +173,6 @@ impl<'a, C: Chain> Annealing<'a, C> {
         annealing
     }
 
-    /// Recomputes all states and values.
     fn refresh(&mut self) {
         let mut state = None;
         for k in 0..self.order.len() {
@@ -474,7 +473,6 @@ const INCREMENT_RATIO: f64 = 0.2;
 /// Maximum number of bids for each row in a round, so that an auction ends for any weights.
 const MAX_BIDS_PER_ROW: usize = 60;
 
-/// Prices of the columns.
 struct Prices {
     /// Largest profit of each row at these prices: `max_j weight(i, j) - price(j)`.
     profit: Vec<f64>,

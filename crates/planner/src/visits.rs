@@ -12,7 +12,6 @@ const MAX_SIMULATED_JUMPS: usize = 24;
 /// In plans of at most this many points, a repeat may move anywhere if no position near its own is allowed.
 const MAX_POINTS_FREE_REPEATS: usize = 200;
 
-/// One visit of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Visit {
     pub(crate) index: usize,
@@ -69,7 +68,6 @@ fn jumps_from_slowest(points: &[OperatingPoint], selected: Vec<usize>) -> Vec<(u
     selected.into_iter().filter(faster).map(|to| (slowest, to)).collect()
 }
 
-/// The visits of an order without repeats.
 pub(crate) fn visits_of_points(order: &[usize]) -> Vec<Visit> {
     order.iter().map(|&index| Visit { index, kind: StepKind::Point }).collect()
 }

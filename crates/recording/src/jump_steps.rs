@@ -45,7 +45,6 @@ const SETTLING_SHARE: f64 = 0.2;
 /// Shaft speed below which the machine is at rest, rpm. Bound: far below any idle, far above any sensor's noise.
 const MAX_REST_RPM: f64 = 1000.0;
 
-/// The measured channels that jump, in the order of the table.
 fn measured_jumps() -> impl Iterator<Item = (Channel, f64)> {
     JUMPS.into_iter().filter(|(channel, _)| channel.info().group != Group::Command)
 }
@@ -55,11 +54,9 @@ pub(crate) fn can_be_searched(series: &BTreeMap<Channel, Series>) -> bool {
     measured_jumps().any(|(channel, _)| series.get(&channel).is_some_and(|series| series.t_s.len() > 30))
 }
 
-/// A jump of measured channels.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Jump {
     pub(crate) start_s: f64,
-    /// The channels that show it.
     pub(crate) channels: Vec<Channel>,
 }
 
@@ -104,7 +101,6 @@ struct Signal {
     values: Vec<f64>,
     /// Sums of the values before each grid point.
     sums: Vec<f64>,
-    /// Noise of a value.
     sigma: f64,
     min_jump_ratio: f64,
     /// Level below which a relative change has no meaning.

@@ -17,7 +17,6 @@ use std::path::Path;
 /// Time 0 of a log on the clock of [`SeriesBuilder`]; it leaves room for negative times. Bound: room for negative times.
 const LOG_ZERO_NS: u64 = 1 << 62;
 
-/// Result of reading a log.
 #[derive(Debug, Default)]
 pub(crate) struct LogContent {
     pub(crate) builders: BTreeMap<MappedQuantity, SeriesBuilder>,
@@ -34,7 +33,6 @@ pub(crate) struct LogContent {
     kept: u64,
 }
 
-/// Use of a mapped column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Target {
     MappedQuantity(MappedQuantity),
@@ -47,7 +45,6 @@ struct WantedColumn {
     unit: &'static Unit,
 }
 
-/// Reads the mapped columns.
 pub(crate) fn read_log(
     file: &LogFile,
     map: &ChannelMap,
@@ -168,7 +165,6 @@ fn resolve_columns(map: &ChannelMap, layout: &Layout) -> Result<Vec<WantedColumn
     Ok(list)
 }
 
-/// Contradictions between the units of the map and the log.
 fn find_unit_conflicts(map: &ChannelMap, layout: &Layout, wanted: &[WantedColumn]) -> Vec<ReadWarning> {
     let contradiction = |wanted: &WantedColumn| {
         let Target::MappedQuantity(reads) = wanted.target else { return None };

@@ -63,7 +63,6 @@ impl<'a> Body<'a> {
     }
 }
 
-/// A topic as a file defines it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ChannelDefinition {
     pub(crate) id: u16,
@@ -74,7 +73,6 @@ pub(crate) struct ChannelDefinition {
     pub(crate) schema: Vec<u8>,
 }
 
-/// Id and content of a schema.
 pub(crate) fn parse_schema(body: &[u8]) -> Option<(u16, &[u8])> {
     let mut body = Body(body);
     let id = body.u16()?;
@@ -97,7 +95,6 @@ pub(crate) fn parse_message(body: &[u8]) -> Option<(u16, u64, &[u8])> {
     Some((id, log_time, body.0))
 }
 
-/// Name and pairs of a metadata record.
 pub(crate) fn parse_metadata(body: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
     let mut body = Body(body);
     Some((body.text()?, body.text_map()?))
@@ -116,7 +113,6 @@ pub(crate) fn parse_attachment(record: &[u8]) -> Option<(String, &[u8])> {
 /// Bytes before a record's body. Source: MCAP, one of opcode, eight of length.
 const FRAME_BYTES: usize = 9;
 
-/// Result of a read.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Frame<'a> {
     /// A whole record.
@@ -140,7 +136,6 @@ impl<R: Read> FrameReader<R> {
         FrameReader { source, offset, buffer: Vec::new() }
     }
 
-    /// The next record.
     pub(crate) fn next_frame(&mut self) -> io::Result<Frame<'_>> {
         let offset = self.offset;
         self.buffer.clear();
@@ -187,11 +182,9 @@ pub(crate) trait Sink: Sync {
     /// A metadata record.
     fn metadata(&mut self, name: String, pairs: BTreeMap<String, String>);
     fn attachment(&mut self, name: String, data: &[u8]);
-    /// Number of values kept so far.
     fn value_count(&self) -> u64;
 }
 
-/// The content of a field in a message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum FieldValue {
     /// The field is missing.
@@ -441,7 +434,6 @@ const MAX_BATCH_CHUNKS: usize = 1024;
 /// Parts of a batch. Bound: more than there are cores, to balance the load.
 const PARTS: usize = 16;
 
-/// A record of a chunk.
 pub(crate) enum Item<T> {
     /// A message on a topic that was known before the batch; `None` if the topic is not wanted.
     Message { channel_id: u16, log_time_ns: u64, message: Option<T> },
@@ -471,7 +463,6 @@ impl Batch {
         claimed_bytes(body).is_none_or(|bytes| bytes <= MAX_BATCH_BYTES)
     }
 
-    /// Adds a chunk at `offset` in the file.
     pub(crate) fn push(&mut self, offset: u64, body: &[u8]) {
         self.bytes = self.bytes.saturating_add(claimed_bytes(body).unwrap_or(0));
         self.chunks.push((offset, body.to_owned()));

@@ -49,10 +49,6 @@ pub struct ReadReport {
 ///
 /// Steps come from the recording's own markers; if it has none, from changes of the command channels. For a file that
 /// is truncated or damaged, returns the recoverable data with warnings.
-///
-/// # Errors
-/// [`RecordError`] for a file that cannot be opened, is not MCAP, has a later format, contains none of the mapped
-/// measurements, or contains one whose unit is unknown.
 pub fn read_recording(
     path: &Path,
     map: &ChannelMap,
@@ -254,7 +250,6 @@ fn find_missing_fields(
     absent.map(warning).collect()
 }
 
-/// The series of a recording.
 struct RunSeries {
     series: BTreeMap<Channel, Series>,
     elements: BTreeMap<Element, Series>,
@@ -423,7 +418,6 @@ fn combine_sensors(
     }
 }
 
-/// A constant value over the whole recording.
 fn constant_series(first_s: f64, last_s: f64, value: f64) -> Series {
     if first_s < last_s {
         Series { t_s: vec![first_s, last_s], values: vec![value; 2] }

@@ -32,7 +32,6 @@ pub(crate) struct ScanResult {
     /// Records of any kind, damaged ones included.
     records: u64,
     damaged: u64,
-    /// Chunks that could be unpacked.
     unpacked_chunks: u64,
     /// Bytes of all definitions and schemas.
     defined_bytes: usize,
@@ -184,7 +183,6 @@ impl ScanResult {
         }
     }
 
-    /// Whether there is room for more.
     fn has_capacity(&self, options: &ReadOptions, sink: &impl Sink) -> bool {
         self.records <= options.max_messages && sink.value_count() <= options.max_values
     }

@@ -176,7 +176,6 @@ pub(crate) fn find_steps(
     steps
 }
 
-/// Median of the numbers of a segment.
 fn median_number(series: &Series, start_s: f64, end_s: f64) -> Option<f64> {
     median(series.slice(start_s, end_s).1.iter().filter(|value| value.is_finite()))
 }

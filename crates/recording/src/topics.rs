@@ -63,7 +63,6 @@ pub enum StepPhase {
     Abandoned,
 }
 
-/// A topic as the recording defines it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Topic {
     /// E.g. `/rig/compressor`.
@@ -81,7 +80,6 @@ impl Topic {
         Topic { name, schema: numeric_schema(name, fields), units }
     }
 
-    /// Starts and ends of steps.
     pub(crate) fn of_steps() -> Topic {
         let (schema, units) = step_schema();
         Topic { name: STEP_TOPIC, schema, units }
@@ -114,12 +112,10 @@ pub(crate) fn step_message(step: &StepMarker, phase: StepPhase) -> (f64, Value) 
     (t_s, message)
 }
 
-/// Message of an event.
 pub(crate) fn event_message(event: &Event) -> Value {
     json!({"t_s": event.t_s, "kind": event.kind, "message": event.message})
 }
 
-/// One numeric field of a topic.
 pub(crate) struct Field<'a> {
     pub(crate) name: &'a str,
     pub(crate) title: &'a str,
@@ -139,14 +135,12 @@ impl<'a> Field<'a> {
     }
 }
 
-/// Schema of a topic of flat numeric fields.
 fn numeric_schema(title: &str, fields: &[Field<'_>]) -> Vec<u8> {
     let properties: Map<String, Value> =
         fields.iter().map(|field| (field.name.to_owned(), field.schema())).collect();
     object(title, properties)
 }
 
-/// Schema of `/step` with the units of its fields.
 fn step_schema() -> (Vec<u8>, BTreeMap<String, String>) {
     let point = |description: &str| {
         json!({"type": "object", "description": description, "properties": {
@@ -169,7 +163,6 @@ fn step_schema() -> (Vec<u8>, BTreeMap<String, String>) {
     (typed("step", properties), BTreeMap::from(units))
 }
 
-/// Schema of `/event` with the units of its fields.
 fn event_schema() -> (Vec<u8>, BTreeMap<String, String>) {
     let properties = json!({
         "t_s": {"type": "number", "description": "run time", "unit": "s"},
@@ -179,7 +172,6 @@ fn event_schema() -> (Vec<u8>, BTreeMap<String, String>) {
     (typed("event", properties), BTreeMap::from([("t_s".to_owned(), "s".to_owned())]))
 }
 
-/// Schema of `/rig/provenance` with the units of its fields.
 fn provenance_schema() -> (Vec<u8>, BTreeMap<String, String>) {
     let of = |row: &ChannelInfo| {
         json!({"type": "object", "description": row.description, "properties": {
@@ -206,7 +198,6 @@ fn object(title: &str, properties: Map<String, Value>) -> Vec<u8> {
 /// Chunks are built in memory, without seeking, so that the file ends with a whole chunk at every flush.
 pub(crate) type McapFile = Writer<NoSeek<BufWriter<File>>>;
 
-/// A file that is ready for messages.
 pub(crate) struct OpenedFile {
     pub(crate) mcap: McapFile,
     pub(crate) step_channel: u16,
@@ -269,7 +260,6 @@ pub(crate) fn open(file: File, header: &RecordingHeader) -> McapResult<OpenedFil
     Ok(OpenedFile { mcap, step_channel, event_channel })
 }
 
-/// Defines a topic.
 pub(crate) fn add_channel(mcap: &mut McapFile, topic: &Topic) -> McapResult<u16> {
     let name = topic.name.trim_start_matches('/').replace('/', ".");
     let schema_id = mcap.add_schema(&name, "jsonschema", &topic.schema)?;
@@ -328,7 +318,6 @@ impl ProvenanceWriter {
         if message.is_empty() { None } else { serde_json::to_value(message).ok() }
     }
 
-    /// The topic in the file.
     pub(crate) fn channel(&mut self, mcap: &mut McapFile) -> McapResult<u16> {
         if let Some(channel) = self.channel {
             return Ok(channel);

@@ -61,10 +61,6 @@ pub struct RecordingWriter {
 
 impl RecordingWriter {
     /// Creates the file and writes header, metadata and attachments.
-    ///
-    /// # Errors
-    /// [`RecordError::Exists`] if the file exists; [`RecordError::Create`] and [`RecordError::Write`] for errors of the
-    /// system.
     pub fn create(path: &Path, header: &RecordingHeader) -> Result<RecordingWriter, RecordError> {
         let file = File::create_new(path).map_err(|source| match source.kind() {
             io::ErrorKind::AlreadyExists => RecordError::Exists { path: path.to_owned() },
@@ -73,7 +69,6 @@ impl RecordingWriter {
         RecordingWriter::on(file, path, header)
     }
 
-    /// Writes to a file that is open.
     fn on(file: File, path: &Path, header: &RecordingHeader) -> Result<RecordingWriter, RecordError> {
         let OpenedFile { mcap, step_channel, event_channel } = open(file, header).map_err(|error| {
             RecordError::Write { path: path.to_owned(), saved_until_s: None, source: io_error(error) }
@@ -287,7 +282,6 @@ impl RecordingWriter {
         Ok(())
     }
 
-    /// The topics of a batch, with their columns.
     fn group_by_topic<'a>(&mut self, batch: &'a SampleBatch) -> Result<Vec<Table<'a>>, RecordError> {
         let mut tables = Vec::with_capacity(Group::ALL.len() + 2);
         if batch.t_s.is_empty() {

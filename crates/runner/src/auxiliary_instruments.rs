@@ -46,14 +46,6 @@ pub struct RigWithInstruments {
     rig_last_s: Option<f64>,
 }
 
-/// An auxiliary instrument failed.
-#[derive(Debug, thiserror::Error)]
-#[error("the reader `{name}`: {message}")]
-struct InstrumentError {
-    name: String,
-    message: String,
-}
-
 impl RigWithInstruments {
     /// `rig` with the auxiliary instruments `readers`. In simulated time each instrument is polled together with the rig. Otherwise each
     /// has its own thread, and `deadline` to connect.
@@ -134,7 +126,6 @@ impl RigWithInstruments {
         merged
     }
 
-    /// Disconnects all instruments that were connected.
     fn disconnect(&mut self) {
         // Errors while disconnecting are ignored: the rig is released anyway.
         self.sources.iter_mut().for_each(|source| drop(source.link.disarm()));
@@ -192,8 +183,7 @@ impl Backend for RigWithInstruments {
         for index in 0..self.sources.len() {
             let Some(source) = self.sources.get_mut(index) else { break };
             if let Err(error) = source.link.arm() {
-                let source =
-                    Box::new(InstrumentError { name: source.name.clone(), message: error.to_string() });
+                let source = format!("the reader `{}`: {error}", source.name).into();
                 self.disconnect();
                 return Err(BackendError::Lost { t_s: 0.0, source });
             }
@@ -308,7 +298,6 @@ fn resample_truth(rig: &SampleBatch, t_s: &[f64]) -> Vec<TruthColumn> {
     rig.truth.iter().map(column).collect()
 }
 
-/// Adds the wanted channels of one source to the merged batch.
 fn add_channels(
     merged: &mut SampleBatch,
     part: SampleBatch,
@@ -341,7 +330,6 @@ pub(crate) enum Call {
     Disarm,
 }
 
-/// Connection to the backend of an instrument.
 pub(crate) enum InstrumentLink {
     /// Called directly: in simulated time all sources wait for each other.
     Direct { backend: Box<dyn Backend>, answer: Option<Answer> },
@@ -349,7 +337,6 @@ pub(crate) enum InstrumentLink {
     OwnThread {
         calls: Sender<Call>,
         answers: Receiver<Answer>,
-        /// A request is pending.
         is_pending: bool,
         armed: bool,
         deadline: Duration,
@@ -404,7 +391,6 @@ impl InstrumentLink {
         }
     }
 
-    /// The answer, if it has arrived.
     pub(crate) fn answer(&mut self) -> Option<Answer> {
         match self {
             InstrumentLink::Direct { answer, .. } => answer.take(),

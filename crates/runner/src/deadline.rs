@@ -38,15 +38,10 @@ pub struct Deadlines {
     pub call: Duration,
 }
 
-/// Why the thread of a backend gives no more answers.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-struct ThreadEnded(String);
-
 pub(crate) const ENDED: &str = "its thread has ended";
 
 pub(crate) fn lost_error(message: impl Into<String>) -> BackendError {
-    BackendError::Lost { t_s: 0.0, source: Box::new(ThreadEnded(message.into())) }
+    BackendError::Lost { t_s: 0.0, source: message.into().into() }
 }
 
 /// Contains a panic of a backend, which `name` names.

@@ -26,7 +26,6 @@ pub struct DriftWatch<'a> {
     before: Option<PlanStep>,
     current: Option<PlanStep>,
     readings: VecDeque<(f64, Vec<f64>)>,
-    /// Steps to be inserted.
     inserted: VecDeque<PlanStep>,
     /// Whether the current jump is a confirmation.
     confirming: bool,

@@ -19,7 +19,7 @@ impl StepSourceError {
     }
 }
 
-/// Provides steps one by one, and receives their results. Guards and observers are independent of it.
+/// Provides steps one by one, and receives their results; an error ends the run in its safe state. Guards and observers are independent of it.
 ///
 /// A source that wraps another one implements both [`StepSource::inner`] and [`StepSource::inner_mut`]. Methods that it does not
 /// implement are then forwarded to the wrapped source.
@@ -61,9 +61,6 @@ pub trait StepSource {
     }
 
     /// The next step; `None` ends the run. Its index counts up from 0. Blocks unless [`is_ready`](Self::is_ready) returned true.
-    ///
-    /// # Errors
-    /// [`StepSourceError`] ends the run in its safe state.
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError>;
 
     /// Called when the latest step starts with its jump, and again if a guard requests that the step is repeated. Does nothing by default.
@@ -79,17 +76,11 @@ pub trait StepSource {
     }
 
     /// A step has ended; the marker holds its real end. Not called for a step that a guard or a fault has cut short.
-    ///
-    /// # Errors
-    /// [`StepSourceError`] ends the run in its safe state.
     fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         self.inner_mut().map_or(Ok(()), |inner| inner.after_step(marker))
     }
 
     /// A guard has skipped the step; the marker holds the time at which it was cut short.
-    ///
-    /// # Errors
-    /// [`StepSourceError`] ends the run in its safe state.
     fn after_skipped_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         self.inner_mut().map_or(Ok(()), |inner| inner.after_skipped_step(marker))
     }
@@ -194,12 +185,10 @@ pub(crate) struct RestWatch {
     block_end_s: Option<f64>,
     /// Sums and counts of the current block.
     sums: [(f64, usize); WATCHED.len()],
-    /// The last means.
     means: VecDeque<[f64; WATCHED.len()]>,
 }
 
 impl RestWatch {
-    /// Receives the samples of the soak.
     pub(crate) fn on_batch(&mut self, batch: &SampleBatch) {
         let columns = WATCHED.map(|channel| batch.columns.iter().find(|column| column.channel == channel));
         for (index, t_s) in batch.t_s.iter().enumerate() {

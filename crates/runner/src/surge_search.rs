@@ -56,7 +56,6 @@ pub struct SurgeSearch<'a> {
     surges: usize,
 }
 
-/// The current approach.
 struct Approach {
     end: PlanStep,
     stage: Stage,

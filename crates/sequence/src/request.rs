@@ -42,7 +42,6 @@ pub struct SequenceRequest {
     pub order: OrderPoints,
 }
 
-/// Refusal of a step.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Refusal {
     pub message: String,
@@ -64,7 +63,6 @@ impl SequenceRequest {
 /// Maximum difference between executed and planned duration for a step to end in the planned state, s: one forecast interval.
 const PLANNED_TOLERANCE_S: f64 = 0.5;
 
-/// The forecast of a step.
 pub(crate) struct StepPrediction {
     pub predicted: Predicted,
     /// The way from the point before; `None` for the first step.

@@ -35,9 +35,7 @@ pub struct SequenceRunner {
     /// `None` once the script has ended.
     to_script: Option<SyncSender<Option<StepResult>>>,
     messages: Option<Receiver<ScriptMessage>>,
-    /// Whether the next step has been requested.
     is_requested: bool,
-    /// Waits since the request.
     waits: u32,
     /// The script's answer, until it is fetched.
     answer: Option<Result<ScriptMessage, SequenceError>>,

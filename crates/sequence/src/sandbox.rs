@@ -41,7 +41,6 @@ pub(crate) struct Budget {
     cancelled: AtomicBool,
 }
 
-/// Reason for which a script was ended from outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ScriptEnd {
     /// The script exceeded the limit of operations.

@@ -104,7 +104,6 @@ impl Session {
         self.request.check(point).map_err(|Refusal { message, remedy }| throw(message, &remedy))
     }
 
-    /// Whether a step may go to this point.
     pub fn is_reachable(&mut self, point: OperatingPoint) -> Result<bool, ScriptThrow> {
         if self.checks >= self.check_limit() {
             self.check(point)?;
@@ -112,7 +111,6 @@ impl Session {
         Ok(self.check(point).is_ok())
     }
 
-    /// The planner's order of a set of points.
     pub fn order(&mut self, points: &[OperatingPoint]) -> Result<Vec<OperatingPoint>, ScriptThrow> {
         // The search time grows faster than the number of points, so a set larger than the grid is refused.
         let max_points = ORDER_LIMIT.max(self.request.points.len());

@@ -429,7 +429,6 @@ pub fn channel_at(measured: Measured, place: Place) -> Option<Channel> {
     }
 }
 
-/// Whether all of a word is known.
 pub(crate) fn is_known_word(word: &str) -> bool {
     let name = ColumnName::read(word);
     name.is_known()

@@ -208,7 +208,6 @@ const LONG_NUMBERS: [&str; 6] = ["tt", "pt", "pi", "pit", "tit", "st"];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Tag {
     pub(crate) measured: Measured,
-    /// The number of its loop.
     pub(crate) number: u32,
 }
 

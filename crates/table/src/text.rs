@@ -193,9 +193,6 @@ impl TextRows {
     }
 
     /// Advances to the next row with a cell; `false` after the last one.
-    ///
-    /// # Errors
-    /// An error of the file, and a line that is too long.
     pub fn advance(&mut self) -> io::Result<bool> {
         loop {
             self.left.set(MAX_LINE_BYTES);
@@ -260,9 +257,6 @@ impl TextRows {
 }
 
 /// The separator of a text and its first rows, at most `max_rows`; `None` for text without a table of numbers.
-///
-/// # Errors
-/// A line that is too long.
 pub fn detect_text(
     head: &[u8],
     (encoding, mark): (TextEncoding, usize),

@@ -348,9 +348,6 @@ pub fn difference(kind: Kind) -> Kind {
 }
 
 /// The unit with a spelling of this or another program.
-///
-/// # Errors
-/// [`UnitError::WrongUnit`] for what is not a unit of the kind.
 pub fn unit(kind: Kind, spelling: &str) -> Result<&'static Unit, UnitError> {
     let spelling = spelling.trim();
     find(kind, spelling).ok_or_else(|| UnitError::WrongUnit { unit: spelling.to_owned(), kind })

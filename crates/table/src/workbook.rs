@@ -39,9 +39,6 @@ type NextCell<'a> = Box<dyn FnMut() -> Result<Option<(u32, usize, Value)>, Strin
 
 impl<R: Read + Seek> Book<R> {
     /// Opens a workbook that unpacks within limits.
-    ///
-    /// # Errors
-    /// A clause with the problem, about the file.
     pub fn open(mut file: R, limits: XlsxLimits) -> Result<Book<R>, String> {
         let mut head = [0; XLS_MAGIC.len()];
         let is_compound = file.read_exact(&mut head).is_ok() && head == XLS_MAGIC;
@@ -114,9 +111,6 @@ pub struct SheetRows<'a> {
 
 impl SheetRows<'_> {
     /// Advances to the next row with a cell; `false` after the last one.
-    ///
-    /// # Errors
-    /// A clause with the problem, about the file.
     pub fn advance(&mut self) -> Result<bool, String> {
         self.row.clear();
         let mut current = None;

@@ -53,9 +53,6 @@ struct Globals {
 }
 
 /// Reads all sheets with cells.
-///
-/// # Errors
-/// The reason, if it is no workbook, is encrypted, or is larger than its limit.
 pub fn read_xls(file: impl Read + Seek) -> Result<Vec<Sheet>, String> {
     let mut file = cfb::CompoundFile::open(file).map_err(|error| error.to_string())?;
     let mut bytes = Vec::new();
@@ -297,7 +294,6 @@ impl<'a> Bytes<'a> {
         Bytes { pieces, piece: 0, at: 0 }
     }
 
-    /// Whether the current record is at its end.
     fn at_end_of_piece(&self) -> bool {
         self.pieces.get(self.piece).is_none_or(|piece| self.at >= piece.len())
     }

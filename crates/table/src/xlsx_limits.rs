@@ -76,7 +76,6 @@ impl Kind {
         }
     }
 
-    /// Memory of an element with this name, bytes.
     fn memory_bytes(self, name: &str) -> u64 {
         match self {
             Kind::SharedStrings if name == "si" => STRING_MEMORY_BYTES,
@@ -87,9 +86,6 @@ impl Kind {
 }
 
 /// Refuses a workbook that would exceed these limits when unpacked.
-///
-/// # Errors
-/// A clause with the problem, about the file.
 pub fn check_xlsx(file: impl Read + Seek, limits: XlsxLimits) -> Result<(), String> {
     let wrong = |error: zip::result::ZipError| error.to_string();
     let mut archive = zip::ZipArchive::new(file).map_err(wrong)?;

@@ -73,7 +73,6 @@ const KNOWN: [&str; 21] = [
     "maxProperties",
 ];
 
-/// Returns all violations of a schema by a value.
 pub(crate) fn find_violations<'a>(schema: &'a Value, value: &'a Value) -> Vec<Violation<'a>> {
     let mut walk = Walk { steps: Vec::new(), violations: Vec::new() };
     walk.check(schema, value);

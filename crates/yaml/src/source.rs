@@ -354,7 +354,6 @@ fn replace_control_characters(text: &str) -> String {
     text.chars().map(replace).collect()
 }
 
-/// Wraps text between words.
 fn wrap(text: &str) -> String {
     let mut out = String::new();
     let mut width = 0;

@@ -19,7 +19,6 @@ pub const PLUGIN: BackendPlugin = BackendPlugin {
     make,
 };
 
-/// Reason for the end of a replay.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum ReplayError {

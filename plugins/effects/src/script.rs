@@ -4,23 +4,58 @@
 //! is limited, so that it ends, with the same result on every machine.
 
 mod engine;
-mod error;
 mod header;
 mod hooks;
 
 pub use crate::script::engine::HOOK_NAMES;
-pub use error::ScriptEffectError;
 
 use engine::Program;
 use header::Header;
 use hooks::ScriptHooks;
 use mapper_core::Channel;
 use mapper_physics::rig::effect::{Effect, EffectError, EffectInfo, NamedValues, Rig};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Maximum length of a script, bytes.
 const MAX_SCRIPT_BYTES: usize = 64 << 10;
+/// Maximum length of a shown line or message, characters.
+const MAX_SHOWN_CHARS: usize = 200;
+
+/// A script that is not an effect.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{}{}: {message}{}", path.display(), place(*line), shown(source_line))]
+pub struct ScriptEffectError {
+    /// The script's file.
+    pub path: PathBuf,
+    /// Line, from 1; `None` for the whole script.
+    pub line: Option<usize>,
+    /// The line itself.
+    pub source_line: String,
+    /// The error and the correct form.
+    pub message: String,
+}
+
+impl ScriptEffectError {
+    fn new(path: &Path, text: &str, line: Option<usize>, message: String) -> Self {
+        let source_line = line.and_then(|line| text.lines().nth(line.checked_sub(1)?)).unwrap_or_default();
+        let clean = |text: &str| text.chars().filter(|c| !c.is_control()).take(MAX_SHOWN_CHARS).collect();
+        ScriptEffectError {
+            path: path.to_owned(),
+            line,
+            source_line: clean(source_line),
+            message: clean(&message),
+        }
+    }
+}
+
+fn place(line: Option<usize>) -> String {
+    line.map_or_else(String::new, |line| format!(":{line}"))
+}
+
+fn shown(source_line: &str) -> String {
+    if source_line.is_empty() { String::new() } else { format!("\n  | {source_line}") }
+}
 
 /// An effect defined by a script.
 #[derive(Debug, Clone)]
@@ -33,10 +68,6 @@ pub struct ScriptEffect {
 
 impl ScriptEffect {
     /// Reads a script; messages contain `path`.
-    ///
-    /// # Errors
-    /// [`ScriptEffectError`] with the line: a header without id, submodel or parameter, a mistake in the script, or a script
-    /// without hooks.
     pub fn new(text: &str, path: &Path) -> Result<Self, ScriptEffectError> {
         let fail = |line: Option<usize>, message: String| ScriptEffectError::new(path, text, line, message);
         if text.len() > MAX_SCRIPT_BYTES {

@@ -16,7 +16,6 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
 /// A line, a position on it, and its node there.
 type Row<'a> = (&'a FittedLine, f64, &'a FittedNode);
 
-/// The columns, in order.
 fn columns<'a>() -> [Column<Row<'a>>; 14] {
     [
         ("speed_corrected_rpm", |(line, ..)| number(line.speed_corrected_rpm)),

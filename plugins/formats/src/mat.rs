@@ -57,7 +57,6 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     Ok(file)
 }
 
-/// Reads the points of a file of this program.
 fn read(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError> {
     let matrices = matrices(bytes);
     let points = matrices.iter().find(|matrix| matrix.name == POINTS && matrix.rows.len() % 4 == 0);

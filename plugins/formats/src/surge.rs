@@ -12,7 +12,6 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     ..MapFormat::NONE
 };
 
-/// The columns, in order.
 fn columns<'a>() -> [Column<&'a SurgeMark>; 10] {
     [
         ("speed_corrected_rpm", |mark| number(mark.speed_corrected_rpm)),

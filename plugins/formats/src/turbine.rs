@@ -146,7 +146,6 @@ fn write_fitted(map: &TurbineMap) -> Result<Vec<u8>, ExportError> {
     Ok(text.into_bytes())
 }
 
-/// The lines of each vane position.
 fn by_vane(fitted: &FittedTurbine) -> impl Iterator<Item = &[FittedTurbineLine]> {
     fitted.lines.chunk_by(|a, b| a.vane_position == b.vane_position)
 }

@@ -153,7 +153,6 @@ fn contents(file: &LogFile) -> Result<Contents, String> {
     }
 }
 
-/// The element that is being read.
 #[derive(Default)]
 struct Element {
     /// Texts of the innermost group, by their tags.

@@ -17,7 +17,6 @@ pub(crate) struct Sample<'a> {
     pub(crate) decimal: u8,
 }
 
-/// A row of the sample.
 pub(crate) struct SampleRow<'a> {
     cells: &'a [String],
     decimal: u8,
@@ -44,7 +43,6 @@ impl Cells for SampleRow<'_> {
     }
 }
 
-/// The cells of a column that are not empty.
 pub(crate) fn cells<'a>(column: usize, sample: &'a Sample<'_>) -> impl Iterator<Item = &'a str> {
     sample
         .rows
@@ -148,7 +146,6 @@ fn is_day_number(column: usize, sample: &Sample<'_>, first: f64) -> bool {
     DAY_NUMBERS.iter().any(|range| range.contains(&first)) && typical < 1e-3
 }
 
-/// Describes the unit of a counter.
 pub(crate) fn describe_unit(unit_s: f64) -> String {
     match unit_s {
         1.0 => "seconds".to_owned(),
@@ -160,7 +157,6 @@ pub(crate) fn describe_unit(unit_s: f64) -> String {
     }
 }
 
-/// The source of a group's time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Clock {
     /// A counter.
@@ -172,7 +168,6 @@ pub(crate) enum Clock {
     Rate { interval_s: f64 },
 }
 
-/// A clock, its start, and its resolution.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct GroupClock {
     pub(crate) clock: Clock,
@@ -198,7 +193,6 @@ pub(crate) struct Spread {
 }
 
 impl Clock {
-    /// Seconds of a counter.
     pub(crate) fn count_s(&self, cells: &dyn Cells) -> Option<f64> {
         match self {
             Clock::Count { column, unit_s } => Some(cells.number(*column))
@@ -233,7 +227,6 @@ fn count_to_s(value: f64, unit_s: f64) -> f64 {
     if unit_s < 1.0 { value / (1.0 / unit_s).round() } else { value * unit_s }
 }
 
-/// Reads a clock row by row.
 #[derive(Debug)]
 pub(crate) struct ClockReader {
     clock: GroupClock,

@@ -10,7 +10,6 @@ use mapper_table::{
     DateOrder, Instant, NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant, parse_number,
 };
 
-/// The clocks of a table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Clocks {
     pub(crate) groups: Vec<(Group, GroupClock)>,
@@ -110,7 +109,6 @@ impl Candidate {
     }
 }
 
-/// Finds the clocks of a table.
 pub(crate) fn choose_clocks(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks, String> {
     let mut clocks = Clocks { group_of: vec![Some(0); sample.columns.len()], ..Clocks::default() };
     let candidates = match (options.time.as_slice(), options.rate_hz) {
@@ -264,7 +262,6 @@ fn candidate(clock: Clock, at: usize, sample: &Sample<'_>, dated: bool) -> Candi
     Candidate { clock, at, readings_s, dated }
 }
 
-/// Adds the offsets of [`restart_offset_ns`] to the readings.
 fn add_restart_offsets(readings_s: &mut [Option<f64>], period_ns: i64) {
     let (mut added_ns, mut last_ns) = (0, None);
     for reading in readings_s.iter_mut().flatten() {

@@ -84,7 +84,6 @@ const PACKED_HEADER: usize = 48;
 const CONVERSION_HEADER: usize = 46;
 const FORMULA: [[u8; 2]; 2] = [[10, 0], [0, 10]];
 
-/// The file as the library reads it.
 pub(crate) struct MdfSource {
     inner: Box<dyn ByteSource>,
     /// Unpacked size of each compressed block that was read, bytes, by its offset.

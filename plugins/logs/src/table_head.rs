@@ -12,7 +12,6 @@ pub(crate) const MAX_COLUMNS: usize = 10_000;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct TableHead {
     pub(crate) columns: Vec<HeadColumn>,
-    /// Index of the first row of data.
     pub(crate) data_row: usize,
     /// Unit after each number of a column, if the cells have one.
     pub(crate) cell_units: BTreeMap<usize, String>,

@@ -154,7 +154,6 @@ fn note_empty_columns(table: &mut Table, head: &[Vec<String>]) {
     }
 }
 
-/// The rows of a sheet of a file.
 struct BookRows<'a> {
     file: &'a LogFile,
     rows: SheetRows<'a>,

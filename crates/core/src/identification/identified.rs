@@ -212,9 +212,6 @@ impl Margins {
 }
 
 /// Reads a number that is null in files if it is unknown.
-///
-/// # Errors
-/// The errors of the deserializer.
 pub fn nan_where_null<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

@@ -86,9 +86,6 @@ pub enum RecordingError {
 
 impl Recording {
     /// The series of a channel.
-    ///
-    /// # Errors
-    /// [`RecordingError::MissingChannel`] if the channel is missing or empty.
     pub fn require(&self, channel: Channel) -> Result<&Series, RecordingError> {
         self.series
             .get(&channel)

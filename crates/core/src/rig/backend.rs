@@ -88,9 +88,6 @@ pub struct SetpointRanges {
 
 impl SetpointRanges {
     /// Rejects setpoints outside the ranges, and those that are not numbers.
-    ///
-    /// # Errors
-    /// [`BackendError::SetpointOutOfRange`] for the first one outside.
     pub fn check(&self, setpoints: &Setpoints) -> Result<(), BackendError> {
         for (quantity, value, unit, range) in [
             ("P3", setpoints.p3_pa, "Pa", self.p3_pa),

@@ -24,9 +24,6 @@ pub trait Steps: Sized {
     fn numbers(&self) -> Self::Numbers;
 
     /// Their indices.
-    ///
-    /// # Errors
-    /// An error for step 0.
     fn indices<E: Error>(numbers: Self::Numbers) -> Result<Self, E>;
 }
 
@@ -72,9 +69,6 @@ pub fn serialize<S: Serializer>(indices: &impl Steps, serializer: S) -> Result<S
 }
 
 /// Reads numbers from 1 as indices.
-///
-/// # Errors
-/// The errors of the deserializer, and an error for step 0.
 pub fn deserialize<'de, T: Steps, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
     T::indices(T::Numbers::deserialize(deserializer)?)
 }
@@ -101,9 +95,6 @@ pub mod entry {
     }
 
     /// Reads `step` or `index`.
-    ///
-    /// # Errors
-    /// The errors of the deserializer, and an error if neither key is present or `step` is 0.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
         let StepOrIndex { step, index } = StepOrIndex::deserialize(deserializer)?;
         match step {

@@ -32,7 +32,6 @@ pub(crate) struct Readings {
     pub(crate) run_ratio: f64,
     /// As in [`IdentifyConfig`].
     pub(crate) exact_at: ExactReadings,
-    /// The compressed air.
     pub(crate) air: Air,
 }
 
@@ -165,7 +164,6 @@ impl Smooth {
         terms + self.slow.powi(2) * a.slowness * b.slowness + self.amplitude.powi(2) * (-0.5 * apart).exp()
     }
 
-    /// Covariance of the function's values.
     pub(crate) fn covariance(&self, places: &[At]) -> DMatrix<f64> {
         DMatrix::from_fn(places.len(), places.len(), |i, j| self.between(&places[i], &places[j]))
     }

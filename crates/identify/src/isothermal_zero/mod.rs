@@ -5,4 +5,3 @@ pub(crate) mod periodic;
 pub(crate) mod references;
 pub(crate) mod soak_readings;
 pub(crate) mod zero;
-pub(crate) mod zero_outcome;

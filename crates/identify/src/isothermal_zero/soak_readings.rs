@@ -92,7 +92,6 @@ pub(super) fn combined_sigma(readings: &[Reading]) -> f64 {
     readings.iter().map(|reading| reading.total.powi(-2)).sum::<f64>().sqrt().recip()
 }
 
-/// The common reading of the sensors.
 pub(super) fn common(readings: &[Reading]) -> f64 {
     let weight: f64 = readings.iter().map(|reading| reading.total.powi(-2)).sum();
     readings.iter().map(|reading| reading.mean * reading.total.powi(-2)).sum::<f64>() / weight

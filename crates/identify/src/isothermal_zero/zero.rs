@@ -21,7 +21,7 @@ use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
 use mapper_observe::declared::{CommonOffset, rest, usual_noise_sigma};
 use mapper_physics::rig::sensor_fault::ExactReadings;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
 
 /// Time constant with which a drifting reading approaches its limit, min. Bound: the middle of those of stopped housings, 700 s.
@@ -105,9 +105,6 @@ pub enum NoZero {
 /// non-uniformity. Sensors that do not rest, or that do not agree although they are not T1, T2, P1 or P2, are left out. If a fault is allowed, a
 /// temperature sensor that exceeds its declared offset is compared with the others; if two pressure taps differ by more, either may be wrong, so
 /// both keep their declared offsets.
-///
-/// # Errors
-/// [`NoZero`] if the recording has no soak, or an unsuitable one.
 pub fn isothermal_zero(
     recording: &Recording,
     config: &IdentifyConfig,
@@ -202,7 +199,6 @@ fn used_s(soak_s: f64, settings: &ZeroSettings) -> f64 {
     (0.5 * soak_s).min(settings.longest_s).max(settings.shortest_s)
 }
 
-/// A recording during its soak.
 struct SoakReadings<'a> {
     recording: &'a Recording,
     config: &'a IdentifyConfig,
@@ -519,4 +515,53 @@ fn expected_limit_error(
     let variance = config.noise().variance_of_mean(samples, TREND_BLOCK_S);
     let relaxing: Vec<f64> = t_s.iter().map(|t_s| periodic::usual_k(*t_s)).collect();
     periodic::limit(&t_s, &relaxing, noise_sigma * variance.sqrt()).map(|(_, error)| error)
+}
+
+/// Whether offsets were subtracted from a recording.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum ZeroOutcome {
+    /// Offsets were subtracted.
+    Found(IsothermalZero),
+    /// A zero was requested but the recording has none; the declared offsets remain.
+    Refused(NoZero),
+    /// No zero was requested.
+    #[default]
+    NotRequested,
+}
+
+impl ZeroOutcome {
+    /// Searches for the zero of a recording, if one was requested.
+    pub fn of(recording: &Recording, config: &IdentifyConfig, settings: Option<ZeroSettings>) -> Self {
+        let Some(settings) = settings else { return ZeroOutcome::NotRequested };
+        isothermal_zero(recording, config, &settings).map_or_else(ZeroOutcome::Refused, ZeroOutcome::Found)
+    }
+
+    /// The zero, if one was found.
+    pub fn found(&self) -> Option<&IsothermalZero> {
+        if let ZeroOutcome::Found(zero) = self { Some(zero) } else { None }
+    }
+
+    /// Subtracts the offsets from a recording, and declares their remaining uncertainty in the configuration; both are unchanged if no zero
+    /// was found.
+    pub fn subtract(&self, recording: Recording, config: IdentifyConfig) -> (Recording, IdentifyConfig) {
+        match self {
+            ZeroOutcome::Found(zero) => zeroed(recording, config, zero),
+            ZeroOutcome::Refused(_) | ZeroOutcome::NotRequested => (recording, config),
+        }
+    }
+}
+
+/// Offsets and their remaining uncertainty, K or Pa, with their segment; `{"refused": reason}`, or `null` if none was requested.
+impl Serialize for ZeroOutcome {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Refused {
+            refused: String,
+        }
+        match self {
+            ZeroOutcome::Found(zero) => zero.serialize(serializer),
+            ZeroOutcome::Refused(reason) => Refused { refused: reason.to_string() }.serialize(serializer),
+            ZeroOutcome::NotRequested => serializer.serialize_unit(),
+        }
+    }
 }

@@ -11,8 +11,7 @@ use crate::joint::step_model::rows::{Row, StepRows};
 use crate::joint::uncertainty::{Number, Numbers};
 use crate::reading_checks::bounds::EFFICIENCY;
 use crate::step_data::samples::TREND_BLOCK_S;
-use crate::step_outcome::findings::Findings;
-use crate::step_outcome::interval_width;
+use crate::step_outcome::findings::{Findings, judge_interval};
 use mapper_core::{EstimateUncertainty, LeftOut, MapRegion, ModelDoubt, ModelEvidence, PoorFit, Warning};
 use mapper_numerics::statistics::{DOUBT_SIGMAS, EXCLUDE_SIGMAS, HINT_SIGMAS, MIN_VALUES, mean, median, rms};
 
@@ -108,7 +107,6 @@ pub(crate) fn exclude(problem: &mut Problem<'_>, config: &IdentifyConfig) {
     }
 }
 
-/// Verdict on one step.
 pub(crate) fn judge_step(
     problem: &Problem<'_>,
     (index, whitened): (usize, &[f64]),
@@ -123,7 +121,7 @@ pub(crate) fn judge_step(
         findings.refuse(Warning::PoorFit(PoorFit::Eta { eta }));
     }
     if eta_error.combined_standard_error() > config.thresholds.sigma_eta {
-        interval_width::judge(eta_error, dt2_k.unwrap_or(0.0), true, config, findings);
+        judge_interval(eta_error, dt2_k.unwrap_or(0.0), true, config, findings);
     }
     let declared = !config.declared.is_empty();
     let (square, _) = step_noise::mean_squares(member, whitened);
@@ -178,9 +176,7 @@ const SHARES: [f64; 2] = [1.0 / 6.0, 1.0 / 3.0];
 
 /// Steps at one end of the map.
 pub(crate) struct Region {
-    /// The end.
     pub(crate) region: MapRegion,
-    /// Indices of the steps.
     pub(crate) steps: Vec<usize>,
 }
 

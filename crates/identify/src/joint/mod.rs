@@ -379,7 +379,6 @@ impl Fitted {
         Some(Fitted { covariance, refined: refinements.zip(gain), prior_sensitivity })
     }
 
-    /// The numbers of all points of the problem, with their errors.
     fn numbers(&self, problem: &Problem<'_>, steps: &[StepRows]) -> Numbers {
         let known = self.refined.as_ref().map(|(refinements, gain)| (refinements, gain));
         Numbers::of(problem, &self.covariance, known, steps)

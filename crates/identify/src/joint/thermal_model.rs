@@ -24,7 +24,6 @@ const TRANSFORM_STEP: f64 = 1e-6;
 /// - r^2).
 const ENTANGLED: f64 = 0.95;
 
-/// Collects the shared parameters.
 pub(crate) fn thermal_model(
     problem: &Problem<'_>,
     covariance: &Covariance,

@@ -30,7 +30,6 @@ pub(crate) struct Quantity {
 }
 
 impl Quantity {
-    /// Its variance.
     pub(crate) fn variance(&self, covariance: &Covariance) -> f64 {
         self.own_variance + self.answer.dot(&(&covariance.shared * &self.answer))
     }
@@ -142,7 +141,6 @@ impl Sources<'_, '_> {
         errors.map(|(_, contribution)| contribution * contribution).sum()
     }
 
-    /// The rows of a number.
     pub(crate) fn rows(&self, quantity: &Quantity, freedom: f64, number: &Number) -> Vec<BudgetRow> {
         let mut rows = Vec::new();
         let mut left = number.error * number.error;
@@ -242,7 +240,6 @@ fn unit(index: usize) -> &'static str {
 /// Step of the derivative of h by a declared error, in its standard deviations. Bound: the law is nearly linear over it.
 const STEP_SIGMAS: f64 = 0.1;
 
-/// The numbers of all points.
 #[derive(Debug, Clone)]
 pub(crate) struct Numbers {
     pub(crate) eta: Vec<Number>,

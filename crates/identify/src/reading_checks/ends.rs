@@ -31,7 +31,6 @@ pub(crate) struct Ends {
 }
 
 impl Ends {
-    /// Temperature rise of isentropic compression, K.
     pub(crate) fn isentropic_rise_k(&self) -> f64 {
         self.t1_k * isentropic_rise_ratio(self.p2_pa / self.p1_pa, self.t1_k, self.air)
     }
@@ -80,7 +79,6 @@ pub(crate) fn ends(recording: &Recording, config: &IdentifyConfig) -> Vec<Option
 pub(crate) struct FailedCheck {
     /// Channel and values.
     pub(crate) warning: Warning,
-    /// Positions of the steps.
     pub(crate) steps: Vec<usize>,
     /// Whether identification omits the samples concerned, so that the rest of the step can be used.
     pub(crate) samples_left_out: bool,

@@ -92,7 +92,6 @@ impl Correlation {
 /// Step of a derivative by a reading, relative. Bound: between rounding and curvature.
 pub(crate) const READING_STEP_RATIO: f64 = 1e-5;
 
-/// Effect of the declared uncertainties.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct DeclaredEffect {
     /// Standard errors of eta and h from fixed offsets and gains.

@@ -5,8 +5,7 @@ use crate::single_step::covariance::{Correlation, DeclaredEffect, NoiseVariances
 use crate::single_step::fit::{Fit, Geometry, fit};
 use crate::step_data::samples::{Row, Samples, TREND_BLOCK_S, without_spikes};
 use crate::step_data::{end_state, samples};
-use crate::step_outcome::findings::Findings;
-use crate::step_outcome::interval_width;
+use crate::step_outcome::findings::{Findings, judge_interval};
 use mapper_core::{
     BudgetRow, Channel, EstimateUncertainty, FitFailure, NoCompression, PoorFit, Recording, TooFew, Warning,
     Window,
@@ -77,7 +76,6 @@ pub(crate) fn alone<S: Sync, E: Sync>(
     parallel::map(&positions, of).into_iter().unzip()
 }
 
-/// Identifies the step at `position`.
 pub(crate) fn estimate(
     recording: &Recording,
     position: usize,
@@ -176,7 +174,6 @@ fn uncertainties(
     })
 }
 
-/// A fit with its data.
 struct View<'a> {
     fit: &'a Fit,
     samples: &'a Samples,
@@ -192,7 +189,7 @@ fn judge_width(view: &View<'_>, eta: EstimateUncertainty, dt2_k: Option<f64>, fi
     if sigma_eta <= limits.sigma_eta && dt2_k.abs() >= limits.dt2_k {
         return;
     }
-    interval_width::judge(eta, dt2_k, false, view.config, findings);
+    judge_interval(eta, dt2_k, false, view.config, findings);
 }
 
 /// Checks that the assumed alpha_A is known well enough. `off_eta`: its error of eta, one standard deviation.

@@ -63,7 +63,6 @@ impl Geometry {
     }
 }
 
-/// A fit with the data needed to judge it.
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
     pub(crate) eta: f64,
@@ -94,7 +93,6 @@ impl Fit {
         (self.inverse_normal * right(&self.jacobian, t2_change_k)).into()
     }
 
-    /// Root mean square of the residual, K.
     pub(crate) fn residual_rms_k(&self) -> f64 {
         rms(&self.residual_k).unwrap_or(0.0)
     }
@@ -356,7 +354,6 @@ pub(crate) fn follow(lags: &[Lag], first: f64, history: &[f64]) -> Vec<f64> {
     readings
 }
 
-/// The declared probe and its pipe.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Probe {
     /// Diameter of its tip, m; 0 for a probe without inertia.

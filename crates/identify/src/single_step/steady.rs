@@ -7,8 +7,7 @@ use crate::IdentifyConfig;
 use crate::single_step::covariance::READING_STEP_RATIO;
 use crate::single_step::dynamic::{Estimate, enough};
 use crate::step_data::samples::{Row, Samples, slope_per_s, without_spikes};
-use crate::step_outcome::findings::Findings;
-use crate::step_outcome::interval_width;
+use crate::step_outcome::findings::{Findings, wide_interval};
 use mapper_core::unit_factors::S_PER_MIN;
 use mapper_core::{Channel, EstimateUncertainty, EtaSignal, NoCompression, Recording, Warning, Window};
 use mapper_numerics::statistics::standard_deviation;
@@ -26,7 +25,6 @@ pub(crate) fn apparent_eta(row: &Row, air: Air) -> f64 {
     apparent_efficiency(row.p2_pa / row.p1_pa, row.t1_k, row.t2_k, air)
 }
 
-/// Identifies the step at `position`.
 pub(crate) fn estimate(
     recording: &Recording,
     position: usize,
@@ -82,7 +80,7 @@ pub(crate) fn estimate(
     }
     if uncertainty.combined_standard_error() > limits.sigma_eta {
         let signal = EtaSignal::Settled { rise_k: means.t2_k - means.t1_k };
-        findings.doubt(interval_width::wide(uncertainty, signal));
+        findings.doubt(wide_interval(uncertainty, signal));
     }
     findings.remark(Warning::Apparent);
     findings.remark_undeclared(config);

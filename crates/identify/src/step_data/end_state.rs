@@ -10,7 +10,6 @@ use mapper_numerics::statistics::{mean, median, robust_sigma};
 use mapper_observe::fuse::SPIKE_SIGMAS;
 use mapper_physics::operating_point::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 
-/// The operating point at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct EndState {
     pub(crate) speed_rpm: f64,
@@ -128,7 +127,6 @@ fn settled(
     Some(Window { start_s, end_s })
 }
 
-/// Settling of an operating point.
 pub(crate) struct Settling {
     /// The quantity that settles last.
     pub(crate) slowest: &'static str,

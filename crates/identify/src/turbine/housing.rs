@@ -54,7 +54,6 @@ pub(crate) struct HousingState {
     pub(crate) speed_rpm: f64,
 }
 
-/// A block of a step.
 struct Block {
     state: HousingState,
     /// Rate of Tt, K/s, and its standard error.
@@ -296,7 +295,6 @@ fn block_of(
     Some(Block { state, rate_k_s: line.slope, rate_sigma_k_s: sigma_k / line.spread })
 }
 
-/// A line through readings.
 pub(crate) struct Line {
     /// Unit of the readings per second.
     pub(crate) slope: f64,

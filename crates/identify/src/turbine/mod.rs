@@ -55,7 +55,6 @@ struct Inputs {
     heat_w: f64,
 }
 
-/// Numbers of a turbine point.
 #[derive(Debug, Clone, Copy)]
 struct Numbers {
     flow_parameter_kg_sqrt_k_s_kpa: f64,
@@ -89,7 +88,6 @@ impl Inputs {
     }
 }
 
-/// Changes of a point's numbers.
 #[derive(Debug, Clone, Copy, Default)]
 struct Change {
     ln_flow: f64,

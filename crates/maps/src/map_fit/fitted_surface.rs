@@ -82,7 +82,6 @@ impl MapFit {
         self.solution.shape(self.speed_ratio(speed_corrected_rpm))
     }
 
-    /// Whether a speed is outside the measured range.
     pub(crate) fn is_outside(&self, speed_ratio: f64) -> bool {
         self.solution.splines.shape.outside(speed_ratio) > SPEED_ROUNDING_RATIO
     }
@@ -101,7 +100,6 @@ impl MapFit {
     }
 }
 
-/// One standard error of a place.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlaceError {
     /// Across the line, in units of the line's scales.
@@ -259,7 +257,6 @@ struct LineEndAngles {
     measured: Vec<MeasuredEnds>,
 }
 
-/// End angles of a measured line.
 struct MeasuredEnds {
     speed_ratio: f64,
     /// Smallest and largest angle with a measured point.

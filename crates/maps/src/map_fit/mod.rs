@@ -1,6 +1,5 @@
 //! Fits a smooth surface to all speed lines together, stiff enough that no lines cross.
 
-mod error;
 mod fitted_surface;
 pub(crate) mod observations;
 mod prediction_errors;
@@ -8,9 +7,9 @@ pub(crate) mod problem;
 pub(crate) mod solution;
 mod speed_lines;
 
-pub use error::MapFitError;
 pub(crate) use fitted_surface::{MIN_FLOW_KG_S, MIN_RATIO_RANGE};
 pub use fitted_surface::{MapFit, MapFitOptions, NearestPlace};
+pub use observations::MapFitError;
 pub use prediction_errors::leave_out;
 
 use fitted_surface::table;
@@ -22,9 +21,6 @@ use std::collections::BTreeMap;
 
 impl MapFit {
     /// The fit as a table.
-    ///
-    /// # Errors
-    /// [`MapFitError::Speed`] for a further speed below a tenth of the slowest or above 1.3 times the fastest line.
     pub fn table(&self, options: &MapFitOptions) -> Result<FittedMap, MapFitError> {
         let mut table = table(self, options)?;
         if options.leave_one_out {

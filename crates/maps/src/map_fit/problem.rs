@@ -65,7 +65,6 @@ const MAX_KNOTS: usize = 10;
 /// efficiency changes along a line.
 const LEVEL_SD: Parameters = [2.0, 2.0, 0.7, 0.25, 0.4, 0.4, 0.03, 0.03, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5];
 
-/// Data and basis of a fit.
 pub(crate) struct Problem<'a> {
     pub(crate) data: &'a Observations,
     pub(crate) frame: FlowFrame,
@@ -95,7 +94,6 @@ impl<'a> Problem<'a> {
         problem
     }
 
-    /// Maximum of a value over the points of each line.
     fn line_maxima(&self, value: impl Fn(&Observation) -> f64) -> Vec<f64> {
         let mut maxima = vec![f64::MIN; self.data.lines_rpm.len()];
         for point in &self.data.points {

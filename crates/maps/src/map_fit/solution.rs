@@ -17,7 +17,6 @@ use mapper_numerics::least_squares::{Damping, DampingRule, damped_step, inverse}
 use mapper_numerics::statistics::{NORMAL_975, SHARE_975, student_quantile};
 use nalgebra::{DMatrix, DVector};
 
-/// A solved problem.
 #[derive(Debug, Clone)]
 pub(crate) struct Solution {
     pub splines: Splines,
@@ -45,7 +44,6 @@ pub(crate) struct Solution {
 }
 
 impl Solution {
-    /// Parameters of the smooth surface at a speed.
     pub(crate) fn parameters(&self, speed_ratio: f64) -> Parameters {
         let rows = self.splines.rows(speed_ratio);
         std::array::from_fn(|q| self.values.row(q).transpose().dot(rows.of(q)))
@@ -140,7 +138,6 @@ const DAMPING: DampingRule = DampingRule {
     max_trials: 6,
 };
 
-/// Start of a search.
 #[derive(Clone, Copy)]
 enum Start<'a> {
     /// From the points alone, with this scale of the residuals.
@@ -149,7 +146,6 @@ enum Start<'a> {
     Fit(&'a Solution),
 }
 
-/// Phase of the fit.
 enum Phase {
     /// Parameters with fixed starting variances.
     Free,

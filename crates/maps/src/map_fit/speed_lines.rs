@@ -32,7 +32,6 @@ const WORK_TERMS: usize = 6;
 /// Parameters of a line. Source: choke flow, head and flow at zero slope, choke head, two exponents, and the terms.
 pub(crate) const PARAMETERS: usize = 6 + HARMONICS + WORK_TERMS;
 
-/// Position of a parameter.
 pub(crate) type Index = usize;
 /// Parameter: logarithm of the choke flow.
 pub(crate) const CHOKE_FLOW: Index = 0;
@@ -82,7 +81,6 @@ pub(crate) struct Place {
     pub work: f64,
 }
 
-/// A place on a line at a speed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PhysicalPlace {
     pub flow_kg_s: f64,

@@ -13,7 +13,6 @@ use mapper_yaml::units::{Kind, Unit};
 /// Maximum number of letters of a heading that is kept. Bound: a line of a message.
 pub(crate) const MAX_HEADING: usize = 60;
 
-/// A column with its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Column {
     pub(crate) index: usize,
@@ -96,23 +95,19 @@ impl Column {
         !self.unit.to_lowercase().contains("kg")
     }
 
-    /// Whether the heading names a static quantity.
     pub(crate) fn is_static(&self) -> bool {
         ColumnName::read(&parts(&self.heading).0).has(Word::Static)
     }
 
-    /// Whether the heading names a corrected quantity.
     pub(crate) fn is_corrected(&self) -> bool {
         ColumnName::read(&parts(&self.heading).0).has(Word::Corrected)
     }
 
-    /// Whether the heading names a unit.
     pub(crate) fn has_unit(&self) -> bool {
         !self.unit.is_empty()
     }
 }
 
-/// Why a heading is not recognised.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(crate) enum ColumnError {
     #[error(
@@ -123,7 +118,6 @@ pub(crate) enum ColumnError {
     Turbine { heading: String },
 }
 
-/// The machine of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Machine {
     #[default]

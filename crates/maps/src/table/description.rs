@@ -155,9 +155,6 @@ pub fn read_description(path: &Path) -> Result<MapDescription, DescriptionError>
 }
 
 /// Reads a map description; `origin` names it in messages.
-///
-/// # Errors
-/// All mistakes of the text together.
 pub fn description_from_yaml(text: &str, origin: &Path) -> Result<MapDescription, Findings> {
     let (tree, mut notes) = mapper_yaml::read(Source::new(&DOCUMENT, origin, text))?;
     SCHEMA.check(&tree, &mut notes);
@@ -293,8 +290,6 @@ pub(crate) struct DescribedColumns {
 }
 
 impl DescribedColumns {
-    /// # Errors
-    /// [`ImportError::Description`] for an invalid column number, or a unit of another quantity.
     pub(crate) fn of(
         description: &MapDescription,
         machine: Machine,

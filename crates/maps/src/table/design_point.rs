@@ -26,10 +26,6 @@ const MAX_RELATIVE_SPEED: f64 = 10.0;
 
 /// Scales rows with relative speeds to the stated design point, by the rule of NPSS and pyCycle: speed, flow and efficiency in proportion,
 /// pressure ratio minus 1 in proportion. Returns whether the speeds are relative.
-///
-/// # Errors
-/// [`ImportError::RelativeSpeed`] without a design speed, [`ImportError::DesignSpeedUnused`] with one that the file does not need,
-/// [`ImportError::DesignPoint`] if the tables do not have the design point.
 pub fn scale_to_design(
     rows: &mut [Row],
     map: MapDesign,

@@ -55,7 +55,6 @@ const NPSS_TABLE: &str = "Table TB_";
 /// Lines above the tables of GSP and GasTurb. Bound: the title, which begins with 99, and the effect of the Reynolds number.
 const GSP_HEAD: usize = 10;
 
-/// Whether a script assigns arrays.
 fn has_arrays(text: &str) -> bool {
     text.contains("np.array(") || text.lines().any(|line| line.replace(' ', "").contains("=["))
 }
@@ -247,7 +246,6 @@ fn check_unit_of_efficiency(layout: &Layout, rows: &[Row]) -> Result<(), ImportE
     }
 }
 
-/// A value that a point must have.
 pub(super) fn require(point: &Point<'_>, quantity: Quantity, value: Option<f64>) -> Result<f64, ImportError> {
     value.ok_or_else(|| ImportError::NotANumber {
         line: point.at,
@@ -333,9 +331,6 @@ fn measured_point(
 }
 
 /// An absolute pressure, Pa.
-///
-/// # Errors
-/// [`ImportError::NoColumn`] for a gauge pressure without the ambient one.
 pub(super) fn pressure_pa(
     point: &Point<'_>,
     quantity: Quantity,

@@ -136,9 +136,6 @@ impl Row {
 }
 
 /// A map of rows with only four numbers.
-///
-/// # Errors
-/// [`ImportError`] without reference state or points, and for impossible speeds.
 pub fn map_of_rows(
     machine: String,
     rows: &[Row],

@@ -43,9 +43,6 @@ pub struct TurbineComparison {
 }
 
 /// Compares two maps.
-///
-/// # Errors
-/// [`TurbineFitError`] if the first cannot be fitted.
 pub fn compare_turbines(
     first: &TurbineMap,
     second: &TurbineMap,

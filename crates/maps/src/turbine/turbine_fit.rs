@@ -70,7 +70,6 @@ pub struct TurbineFit {
     ends: Vec<LineEnds>,
 }
 
-/// The measured range of a speed line.
 #[derive(Debug, Clone, Copy)]
 struct LineEnds {
     vane_position: f64,
@@ -110,17 +109,11 @@ fn flow_changes(errors: &TurbineCommonErrors, expansion_ratio: f64) -> Vec<f64> 
 
 impl TurbineFit {
     /// Fits a map.
-    ///
-    /// # Errors
-    /// [`TurbineFitError`].
     pub fn new(map: &TurbineMap) -> Result<TurbineFit, TurbineFitError> {
         TurbineFit::with_common_errors(map, &[])
     }
 
     /// Fits a map whose points share errors, one for each point in order; none if empty.
-    ///
-    /// # Errors
-    /// [`TurbineFitError`].
     pub fn with_common_errors(
         map: &TurbineMap,
         common: &[&TurbineCommonErrors],
@@ -231,9 +224,6 @@ fn line_ends(points: &[TurbineMapPoint]) -> Option<LineEnds> {
 }
 
 /// The map with its fitted table.
-///
-/// # Errors
-/// [`TurbineFitError`].
 pub fn fit_turbine(map: TurbineMap) -> Result<TurbineMap, TurbineFitError> {
     let fitted = TurbineFit::new(&map)?.table(&map);
     Ok(TurbineMap { fitted: Some(fitted), ..map })
@@ -241,9 +231,6 @@ pub fn fit_turbine(map: TurbineMap) -> Result<TurbineMap, TurbineFitError> {
 
 /// The map of the turbine at the points of a compressor test, without those that are unusable, with a fitted surface whose intervals contain the
 /// errors that all points share.
-///
-/// # Errors
-/// [`TurbineFitError`].
 pub fn identified_turbine_map(
     machine: &str,
     points: &[&TurbinePoint],
@@ -288,7 +275,6 @@ pub struct ReducedTurbinePoint {
     pub efficiency_standard_error: Option<f64>,
 }
 
-/// Access to one reading of a point.
 type Reading = fn(&mut MeasuredTurbinePoint) -> Option<&mut f64>;
 
 /// The readings that flow and efficiency depend on.

@@ -20,7 +20,6 @@ pub struct ClosedFormMap {
     pub wheel_diameter_m: f64,
 }
 
-/// The two ends of a speed line.
 struct SpeedLineEnds {
     zero_slope_pressure_ratio: f64,
     zero_slope_flow_kg_s: f64,

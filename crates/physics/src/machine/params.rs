@@ -61,9 +61,6 @@ pub enum BoundaryError {
 
 impl BoundaryConditions {
     /// Checks that the running model is valid here.
-    ///
-    /// # Errors
-    /// A pressure, temperature or opening that is not positive and finite, or P3 not above P4.
     pub fn check(&self) -> Result<(), BoundaryError> {
         for (name, value, unit) in [
             ("T1", self.t1_k, "K"),

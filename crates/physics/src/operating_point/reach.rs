@@ -30,9 +30,6 @@ const TOLERANCE_K: f64 = 1e-6;
 
 /// Like [`steady::hold_speed`], with the temperatures in `follow` at the outlet temperature of that steady state; the others are as
 /// in `boundary`.
-///
-/// # Errors
-/// [`SteadyError`] of the last round; [`SteadyError::NoHeatBalance`] if the temperatures do not converge.
 pub fn hold_speed(
     model: &Model,
     speed_rpm: f64,
@@ -143,10 +140,8 @@ impl Obstacle {
     }
 }
 
-/// Solves the steady state of the nominal machine at `point`, whose valve opening replaces that of `boundary`.
-///
-/// # Errors
-/// All reasons why the point cannot be reached, at least one.
+/// Solves the steady state of the nominal machine at `point`, whose valve opening replaces that of `boundary`; or all reasons
+/// why it cannot be reached.
 pub fn reach(
     model: &Model,
     point: OperatingPoint,

@@ -34,9 +34,6 @@ pub struct BackendPlugin {
 
 impl BackendPlugin {
     /// Makes the backend called `name` of a list from its settings.
-    ///
-    /// # Errors
-    /// [`BackendError::Settings`] if the list has no such backend, or the backend rejects its settings.
     pub fn make_by_name(
         plugins: &[BackendPlugin],
         name: &str,

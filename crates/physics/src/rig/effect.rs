@@ -18,9 +18,6 @@ pub trait EffectKind: std::fmt::Debug + Send + Sync + Sized + 'static {
     fn from_values(values: &NamedValues<'_>) -> Result<Self, EffectError>;
 
     /// Adds the effect to a rig. Neutral values change nothing.
-    ///
-    /// # Errors
-    /// [`TooManyExtraStates`] if the rig has no room for its hidden temperatures.
     fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates>;
 }
 
@@ -252,9 +249,6 @@ pub struct NamedValues<'a> {
 
 impl<'a> NamedValues<'a> {
     /// `values` are in the order of the effect's parameters.
-    ///
-    /// # Errors
-    /// [`EffectError`] if a value is missing, out of range or not finite.
     pub fn new(info: &'a EffectInfo, values: &'a [f64]) -> Result<Self, EffectError> {
         let id = || info.id.clone().into_owned();
         if values.len() != info.parameters.len() {
@@ -301,10 +295,6 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
     fn info(&self) -> &EffectInfo;
 
     /// Adds it to a rig.
-    ///
-    /// # Errors
-    /// [`EffectError::Room`] if the rig has no room for its hidden temperatures;
-    /// [`EffectError::NoParameter`] if it uses a parameter that it does not declare.
     fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError>;
 }
 
@@ -328,10 +318,7 @@ pub enum EffectError {
 }
 
 /// Adds `effect` to `rig`, after the effects already there; effects compose in any number and order.
-///
-/// # Errors
-/// [`EffectError`] if a value is missing, out of range or not finite, or there are too many hidden temperatures. The rig
-/// is then unchanged.
+/// After an error the rig is unchanged.
 pub fn add(rig: &mut Rig, effect: &dyn Effect, values: &[f64]) -> Result<(), EffectError> {
     effect.prepare(&NamedValues::new(effect.info(), values)?, rig)
 }

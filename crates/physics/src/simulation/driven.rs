@@ -106,11 +106,9 @@ pub fn drive(
     })
 }
 
-/// One step of a drive.
 pub(crate) struct DrivenStep<'a> {
     /// Start and end, s.
     pub(crate) times_s: [f64; 2],
-    /// State at the start.
     pub(crate) start: State,
     /// State at the end, and between the start and it if one step of the method was sufficient.
     pub(crate) state_at: &'a dyn Fn(f64) -> State,
@@ -255,7 +253,6 @@ impl<I: Inputs> DrivenSystem<'_, I> {
         (surge_before < 1.0) != (self.surge_position(after) < 1.0)
     }
 
-    /// The model at a time within the step.
     pub(crate) fn prepare_for(&mut self, t_s: f64) -> &PreparedModel<'_> {
         let t_s = t_s.min(self.last_s);
         if t_s != self.boundary_s {

@@ -204,9 +204,6 @@ impl<const M: usize> LinearisedRun<M> {
 
     /// Follows another model over the steps between `from_s` and `to_s`, from a distance at their start, which becomes that at their end.
     /// `on_sample` receives what is read at each of `times_s`, which are ends of steps.
-    ///
-    /// # Errors
-    /// [`DriveError`] if the other model reaches no physically possible state.
     pub fn drive_other(
         &self,
         (model, inputs): (&Model, &impl Inputs),

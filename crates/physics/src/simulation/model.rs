@@ -53,7 +53,6 @@ pub struct PreparedModel<'a> {
     flow_correction_ratio: f64,
     air: air::Air,
     cp1_j_kgk: f64,
-    /// Gas constant of the compressor's gas, J/(kg K).
     gas_constant_j_kgk: f64,
     /// Flow of the compressor's gas over that of dry air, through map and valve.
     flow_ratio: f64,

@@ -165,9 +165,6 @@ where
     }
 
     /// Takes one step, at most to `end_s` (> `t_s`).
-    ///
-    /// # Errors
-    /// [`IntegrationError`] if no step above the minimum size meets the tolerance.
     pub fn step(&mut self, system: &mut impl OdeSystem<N>, end_s: f64) -> Result<Step<N>, IntegrationError> {
         self.steps += 1;
         if self.steps > MAX_STEPS {
@@ -217,9 +214,6 @@ where
     /// Takes exactly one step, to `end_s` (> `t_s`), without control of its error: on a frozen grid of steps, runs with
     /// slightly different parameters differ smoothly, which a step-size control would spoil. Also returns the estimate of its error, in
     /// tolerances.
-    ///
-    /// # Errors
-    /// [`IntegrationError::StepTooSmall`] if the system cannot be stepped at all (rates that are not numbers).
     pub fn step_on_grid(
         &mut self,
         system: &mut impl OdeSystem<N>,

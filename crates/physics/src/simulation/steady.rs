@@ -113,7 +113,6 @@ pub fn settle_housings(
     settle(model, boundary, (), balance).ok()
 }
 
-/// Net heat flows of all nodes, W.
 fn heat_flows_w(model: &Model, boundary: &BoundaryConditions, state: &State) -> Temperatures {
     let prepared = model.prepare(boundary);
     let outputs = prepared.evaluate(state);
@@ -216,7 +215,6 @@ fn shaft_load_w(outputs: &Outputs) -> f64 {
     outputs.compressor_power_w + outputs.friction_power_w - outputs.added.shaft_power_w
 }
 
-/// Range of turbine inlet pressures to search, Pa.
 fn turbine_pressures_pa(boundary: &BoundaryConditions) -> (f64, f64) {
     (boundary.p4_pa * (1.0 + 1e-6), boundary.p4_pa * MAX_EXPANSION_RATIO)
 }
@@ -324,9 +322,6 @@ pub enum InputsError {
 
 impl InterpolatedInputs {
     /// Takes strictly rising times, s, and as many rows.
-    ///
-    /// # Errors
-    /// [`InputsError`] if the table is empty, uneven or out of order.
     pub fn new(t_s: Vec<f64>, rows: Vec<BoundaryConditions>) -> Result<Self, InputsError> {
         if t_s.is_empty() || t_s.len() != rows.len() {
             return Err(InputsError::Lengths { times: t_s.len(), rows: rows.len() });

@@ -343,12 +343,9 @@ fn quantity(description: &str, example: &str) -> Value {
     json!({"type": ["string", "number"], "description": description, "examples": [example]})
 }
 
-/// The quantity of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum MappedQuantity {
-    /// A channel.
     Channel(Channel),
-    /// One of several sensors of a channel.
     Element(Element),
 }
 
@@ -360,13 +357,11 @@ impl MappedQuantity {
     }
 }
 
-/// All channels and sensors of the map, with their sources.
 pub(crate) fn sources(map: &ChannelMap) -> impl Iterator<Item = (MappedQuantity, &ChannelSource)> {
     let channels = map.channels.iter().map(|(channel, source)| (MappedQuantity::Channel(*channel), source));
     channels.chain(map.elements.iter().map(|(element, source)| (MappedQuantity::Element(*element), source)))
 }
 
-/// Topic and field of a channel or sensor in the map.
 pub(crate) fn source_of(map: &ChannelMap, reads: MappedQuantity) -> Option<&ChannelSource> {
     match reads {
         MappedQuantity::Channel(channel) => map.channels.get(&channel),

@@ -35,9 +35,6 @@ pub enum ChannelMapError {
 
 impl ChannelMap {
     /// Reads and checks the file of a channel map.
-    ///
-    /// # Errors
-    /// [`ChannelMapError::Read`] if the file cannot be read, [`ChannelMapError::Mistakes`] with all its mistakes.
     pub fn load(path: &Path) -> Result<ChannelMap, ChannelMapError> {
         let mistakes = |findings| ChannelMapError::Mistakes(Box::new(findings));
         let text = mapper_yaml::open(&DOCUMENT, path, MAX_BYTES)
@@ -47,9 +44,6 @@ impl ChannelMap {
     }
 
     /// Reads a channel map; `origin` names it in messages.
-    ///
-    /// # Errors
-    /// All mistakes of the text together.
     pub fn from_yaml(text: &str, origin: &Path) -> Result<ChannelMap, Findings> {
         let (tree, mut notes) = mapper_yaml::read(Source::new(&DOCUMENT, origin, text))?;
         SCHEMA.check(&tree, &mut notes);
@@ -344,13 +338,10 @@ pub(crate) struct MapMistakes {
 }
 
 impl MapMistakes {
-    /// Adds a mistake at a place of the map, with its remedy.
     pub(crate) fn add(&mut self, kind: FindingKind, place: &[Step], message: String, remedy: String) {
         self.list.push((kind, place.to_owned(), message, remedy));
     }
 
-    /// # Errors
-    /// [`RecordError::ChannelMap`] with all mistakes, if there are any.
     pub(crate) fn into_result(self, map: &ChannelMap) -> Result<(), RecordError> {
         if self.list.is_empty() {
             return Ok(());

@@ -11,7 +11,6 @@ use mapper_table::{kind_of, unit};
 use mapper_yaml::units::{Kind, Unit};
 use mapper_yaml::{FindingKind, steps};
 
-/// The readings of a channel.
 pub(crate) struct Readings<'a> {
     pub(crate) channel: Channel,
     pub(crate) source: &'a ChannelSource,

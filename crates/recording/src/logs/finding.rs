@@ -104,7 +104,6 @@ impl fmt::Display for LogFinding {
 }
 
 impl LogFinding {
-    /// The sentence about clocks or parts of the file.
     fn write_clock_or_part(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             LogFinding::Clock { group, clock, others } => {

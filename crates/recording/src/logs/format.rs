@@ -273,9 +273,6 @@ impl LogFile {
     }
 
     /// The content of a file compressed by gzip, in memory; `None` for any other.
-    ///
-    /// # Errors
-    /// [`LogError::Read`] if the file cannot be read or unpacked, or unpacks to more than a file of its size may.
     pub(crate) fn unpack(&self) -> Result<Option<LogFile>, LogError> {
         if self.head(GZIP.len())? != GZIP {
             return Ok(None);
@@ -313,9 +310,6 @@ impl LogFile {
     }
 
     /// The file on disk.
-    ///
-    /// # Errors
-    /// [`LogError::Read`] if it is not a plain file or cannot be opened.
     pub fn open_path(&self) -> Result<File, LogError> {
         mapper_yaml::open_file(&self.path).map_err(|error| self.read_error(error))
     }

@@ -172,9 +172,6 @@ impl LogOptions {
     }
 
     /// Checks that only keys that a format uses are set.
-    ///
-    /// # Errors
-    /// The first other key, with a remedy.
     pub fn allow_only(&self, used: &[&str]) -> Result<(), String> {
         match self.keys_set().into_iter().find(|key| !used.contains(key)) {
             Some(key) => Err(format!(

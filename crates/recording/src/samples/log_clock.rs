@@ -238,7 +238,6 @@ impl BlockAverager {
         }
     }
 
-    /// Whether the rows are averaged.
     pub(crate) fn is_averaging(&self) -> bool {
         matches!(self.state, State::Averaging(_))
     }

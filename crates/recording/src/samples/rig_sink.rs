@@ -36,7 +36,6 @@ impl Topic {
     }
 }
 
-/// The content of a message.
 pub(crate) enum SinkMessage {
     /// A value for each output of its topic, in internal units.
     Samples(Vec<FieldValue>),
@@ -48,7 +47,6 @@ pub(crate) enum SinkMessage {
     Damaged,
 }
 
-/// A message with its place in the file.
 #[derive(Debug)]
 pub(crate) struct PositionedMessage<T> {
     pub(crate) position: u64,
@@ -60,7 +58,6 @@ pub(crate) struct PositionedMessage<T> {
 pub(crate) struct RigSink<'a> {
     path: &'a Path,
     map: &'a ChannelMap,
-    /// Whether fast readings are averaged.
     averages: bool,
     topics: BTreeMap<u16, Topic>,
     pub(crate) topic_names: BTreeSet<String>,
@@ -113,7 +110,6 @@ impl<'a> RigSink<'a> {
         }
     }
 
-    /// Warnings about messages that could not be read.
     pub(crate) fn damaged_messages(&self) -> impl Iterator<Item = ReadWarning> + '_ {
         self.damaged
             .iter()

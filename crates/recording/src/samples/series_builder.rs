@@ -19,7 +19,6 @@ const RECENT_SAMPLES: usize = 6;
 pub(crate) struct ClockBreak {
     /// Number of the message in the file.
     pub(crate) position: u64,
-    /// Index of the sample.
     index: usize,
     /// By how much, ns.
     pub(crate) back_ns: u64,
@@ -30,7 +29,6 @@ pub(crate) struct ClockBreak {
 /// Samples before and after a gap.
 pub(crate) type Sides = (Vec<(f64, f64)>, Vec<(f64, f64)>);
 
-/// Collects the samples of one channel.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SeriesBuilder {
     times_ns: Vec<u64>,
@@ -47,7 +45,6 @@ impl SeriesBuilder {
         self.values.push(value);
     }
 
-    /// Adds the sample of a message.
     pub(crate) fn push_at(&mut self, position: u64, time_ns: u64, value: f64) {
         if let Some(last_ns) = self.times_ns.last() {
             let back_ns = last_ns.saturating_sub(time_ns);
@@ -144,7 +141,6 @@ impl SeriesBuilder {
         }
     }
 
-    /// Whether no sample is earlier than the one before it.
     pub(crate) fn is_in_order(&self) -> bool {
         self.times_ns.is_sorted()
     }

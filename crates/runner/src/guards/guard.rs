@@ -32,7 +32,6 @@ pub trait Guard: Send {
     }
 }
 
-/// All guards of a run, checked together.
 pub(crate) struct ActiveGuards<'a> {
     guards: &'a mut [Box<dyn Guard>],
 }
@@ -73,7 +72,6 @@ impl SpeedHistory {
         self.recent.clear();
     }
 
-    /// Stores the readings up to `now_s`.
     pub(crate) fn add(&mut self, batch: &SampleBatch, now_s: f64) {
         let Some(speeds) = batch.column(Channel::ShaftSpeed) else { return };
         let rows = batch.t_s.iter().copied().zip(speeds.iter().copied());

@@ -96,7 +96,6 @@ impl Sensor {
     }
 }
 
-/// The readings of a sensor so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Track {
     /// Time and value of the last reading that is in its range.
@@ -105,7 +104,6 @@ struct Track {
     jumped: Option<(f64, f64)>,
 }
 
-/// A rule, with the sensor that it checks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Rule {
     /// An impossible reading or jump of one sensor.
@@ -146,7 +144,6 @@ impl Rule {
     }
 }
 
-/// A violated rule.
 #[derive(Debug, Clone, PartialEq)]
 struct Violation {
     rule: Rule,
@@ -202,7 +199,6 @@ impl PlausibilityWatch {
         trip
     }
 
-    /// The violated rules of one sample.
     fn check_sample(
         &mut self,
         batch: &SampleBatch,

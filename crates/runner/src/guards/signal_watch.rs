@@ -63,7 +63,6 @@ impl SignalWatch {
         Some(Trip { t_s, guard: self.spec.name, reaction, reason })
     }
 
-    /// Describes the bound that a value violates.
     fn describe_violation(&self, value: f64, running: bool, slack: f64) -> Option<String> {
         let unit = self.spec.channel.unit();
         match (self.spec.above, self.spec.below) {
@@ -108,7 +107,6 @@ impl SignalWatch {
         })
     }
 
-    /// Trips if the reading changes by more than the allowed change.
     fn check_change(&mut self, t_s: f64, value: f64) -> Option<Trip> {
         let limit = self.spec.change?;
         while self.recent.front().is_some_and(|(then_s, _)| t_s - then_s > limit.within_s) {
@@ -238,7 +236,6 @@ pub struct SilenceWatch {
 #[derive(Debug, Clone)]
 struct Watched {
     of: UnguardedChannel,
-    /// Time of the last reading, s.
     last_s: Option<f64>,
     frozen: Option<FrozenReading>,
     /// Whether its silence was reported, or that it is frozen.

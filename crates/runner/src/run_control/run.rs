@@ -64,7 +64,6 @@ impl<E: Into<RunError>> From<E> for Halt {
     }
 }
 
-/// A run that is under way.
 pub(crate) struct Run<'a, 'p> {
     pub(crate) runner: Runner<'a>,
     pub(crate) protection: &'p Protection<'p>,
@@ -396,7 +395,6 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    /// Passes the source's notes to the observer.
     pub(crate) fn pass_notes(&mut self) -> Result<(), ObserverError> {
         let (t_s, kind) = (self.now_s, EventKind::Note);
         let mut notes = self.runner.steps.take_notes().into_iter();
@@ -404,7 +402,6 @@ impl Run<'_, '_> {
         self.pass_requests()
     }
 
-    /// Records the operator's requests.
     fn pass_requests(&mut self) -> Result<(), ObserverError> {
         let Some(operator) = self.protection.operator else { return Ok(()) };
         let (t_s, kind) = (self.now_s, EventKind::Note);

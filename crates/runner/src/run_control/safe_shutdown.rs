@@ -20,11 +20,6 @@ const MAX_ATTEMPTS: usize = 3;
 /// Time between two of these commands, s of the run's clock: an interrupted link may recover.
 const PAUSE_S: f64 = 0.5;
 
-/// A panic of the backend, as its error.
-#[derive(Debug, thiserror::Error)]
-#[error("the backend failed: {0}")]
-struct PanicError(String);
-
 /// Contains a panic of an observer, so that the shutdown continues.
 pub(crate) fn catch_panic(report: impl FnOnce() -> Result<(), RunError>) -> Result<(), RunError> {
     let panicked =
@@ -173,7 +168,7 @@ impl Run<'_, '_> {
             }
             last =
                 catch_unwind(AssertUnwindSafe(|| self.runner.backend.make_safe())).unwrap_or_else(|panic| {
-                    let source = Box::new(PanicError(panic_message(&*panic)));
+                    let source = format!("the backend failed: {}", panic_message(&*panic)).into();
                     Err(BackendError::Lost { t_s: self.now_s, source })
                 });
             if last.is_ok() {

@@ -73,7 +73,6 @@ pub struct SpeedControl<'a> {
     response_at: ResponseAt<'a>,
     /// Deficit with which steps begin.
     deficit: f64,
-    /// Number of steps in the deficit's average.
     averaged_steps: usize,
     hold: Option<Hold>,
     /// Measured delay of P3 beyond the declared one, s.
@@ -123,7 +122,6 @@ impl Hold {
     }
 }
 
-/// Duration of the transient after a command, s.
 fn transient_s(response: &SpeedResponse) -> f64 {
     (TRANSIENT_TIME_CONSTANTS * response.time_constant_s).clamp(MIN_TRANSIENT_S, MAX_TRANSIENT_S)
 }

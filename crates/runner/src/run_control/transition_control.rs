@@ -52,7 +52,6 @@ const INTERVAL_S: (f64, f64) = (0.1, 1.0);
 /// Longest time that the valve waits for P3 and shaft, s. Bound: a shaft that has not slowed by then does not follow P3.
 const MAX_WAIT_S: f64 = 300.0;
 
-/// A transition under way.
 #[derive(Debug, Clone)]
 pub(crate) struct TransitionControl {
     stand: StandMotion,
@@ -141,7 +140,6 @@ impl TransitionControl {
         self.is_sent() && self.now_s - self.start_s >= watched_s
     }
 
-    /// The setpoints at the latest time.
     pub(crate) fn setpoints(&self) -> Setpoints {
         let between = |from: f64, to: f64, share: f64| match share >= 1.0 {
             true => to,
@@ -265,12 +263,10 @@ impl TransitionControl {
     }
 }
 
-/// The arrival of P3 at the setpoint of a step.
 pub(crate) struct Arrival {
     pub(crate) start_s: f64,
     /// Time after the start by which the plan expects it, s.
     pub(crate) planned_s: f64,
-    /// By how much the step was extended, s.
     pub(crate) extended_s: f64,
 }
 
@@ -288,7 +284,6 @@ pub(crate) struct PressureMotion {
 }
 
 impl PressureMotion {
-    /// Adds the readings of a batch.
     pub(crate) fn add(&mut self, batch: &SampleBatch) {
         let Some(values) = batch.column(Channel::P3) else { return };
         let rows = batch.t_s.iter().copied().zip(values.iter().copied());

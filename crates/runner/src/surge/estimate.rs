@@ -297,7 +297,6 @@ impl SurgeEstimate {
     }
 }
 
-/// The variance of a channel far from surge.
 fn quiet_variance(readings: &[SurgeReading], channel: usize) -> Option<f64> {
     let quiet: Vec<f64> = readings
         .iter()

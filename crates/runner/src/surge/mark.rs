@@ -172,7 +172,6 @@ pub(crate) struct SurgeEvents {
     surge: Option<Surge>,
 }
 
-/// A surge under way.
 #[derive(Debug, Clone, Copy)]
 struct Surge {
     since_s: f64,

@@ -7,9 +7,6 @@ use std::io::{ErrorKind, Read, Seek};
 use std::path::Path;
 
 /// Opens a plain file: the one place where files that a user names are opened. A pipe or a device is not opened: reading it may hang or never end.
-///
-/// # Errors
-/// The system's error; [`io::ErrorKind::InvalidInput`] with a remedy if it is not a file.
 pub fn open_file(path: &Path) -> io::Result<File> {
     let refused = |why: &str| Err(io::Error::new(ErrorKind::InvalidInput, why));
     let mut options = OpenOptions::new();
@@ -51,9 +48,6 @@ fn is_descriptor(path: &Path) -> bool {
 }
 
 /// Reads a file of at most `limit_bytes`. Memory is bounded even if the file reports a wrong size.
-///
-/// # Errors
-/// The system's error; [`io::ErrorKind::FileTooLarge`] for a larger file.
 pub fn read_limited(path: &Path, limit_bytes: usize) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let is_stream = is_descriptor(path) && !std::fs::metadata(path)?.is_file();

@@ -370,9 +370,6 @@ pub struct Tree {
 }
 
 /// Parses a text. The notes are about unsupported features of YAML.
-///
-/// # Errors
-/// The mistakes that make the text unreadable.
 pub fn read(source: Source) -> Result<(Tree, Notes), Findings> {
     let mut notes = Notes::default();
     let Some((places, readable)) = locate(&source, &mut notes) else {
@@ -462,9 +459,6 @@ impl Tree {
     }
 
     /// Deserialises the text into a type. Call it only if no mistakes were found.
-    ///
-    /// # Errors
-    /// The first value that the type rejects although its schema allows it.
     pub fn deserialise<T: DeserializeOwned>(&self) -> Result<T, Finding> {
         let document = serde_yaml::Deserializer::from_str(&self.readable);
         serde_path_to_error::deserialize(document).map_err(|error| {

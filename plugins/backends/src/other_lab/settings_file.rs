@@ -37,9 +37,6 @@ struct StructureFile {
 }
 
 /// Reads a campaign's settings for this lab.
-///
-/// # Errors
-/// [`BackendError::Settings`] with the wrong key and the correct form.
 pub(super) fn read(settings: &serde_json::Value, nominal: &NominalRig) -> Result<LabSettings, BackendError> {
     read_keys(settings, nominal).map_err(|error| match error {
         BackendError::Settings { path, source, .. } => {

@@ -61,7 +61,6 @@ fn find_effect(id: &str, nominal: &NominalRig) -> Result<Arc<dyn Effect>, Settin
 }
 
 impl EffectValues {
-    /// The first name that is not a parameter.
     fn unknown_name(&self, parameters: &[EffectParameter]) -> Option<&str> {
         let EffectValues::Named(values) = self else { return None };
         values

@@ -26,7 +26,6 @@ const CRANKING_SPEED_RPM: f64 = 5_000.0;
 /// extrapolated surge line with too little pressure to reverse the flow.
 const MIN_SURGE_RATIO: f64 = 1.01;
 
-/// The simulated machine.
 #[derive(Debug)]
 enum Machine {
     /// Gas flows.
@@ -35,7 +34,6 @@ enum Machine {
     Standstill {
         /// Housing temperatures.
         state: StandstillState,
-        /// Time of the state, s.
         t_s: f64,
     },
 }
@@ -48,7 +46,6 @@ struct EffectFault {
     fault: String,
 }
 
-/// The state of an armed lab.
 #[derive(Debug)]
 struct ArmedLab {
     inputs: LabInputs,
@@ -292,7 +289,6 @@ impl ArmedLab {
         self.machine = Some(next);
     }
 
-    /// Applies the drift up to now.
     fn drift(&mut self, settings: &LabSettings) {
         if let Some(Machine::Running(simulator)) = self.machine.as_mut()
             && settings.drifts.iter().any(LabDrift::is_machine)

@@ -55,7 +55,6 @@ impl Instant<'_> {
     }
 }
 
-/// All sensors, with the state of their dynamics.
 #[derive(Debug)]
 pub(crate) struct SensorBank {
     pub(crate) sensors: Vec<(Channel, Sensor)>,
@@ -68,7 +67,6 @@ pub(crate) struct SensorBank {
     pub(crate) resonator: Resonator,
 }
 
-/// Collects samples into columns.
 pub(crate) struct SampleCollector {
     first_sequence: u64,
     t_s: Vec<f64>,
@@ -88,7 +86,6 @@ impl SampleCollector {
         }
     }
 
-    /// Number of samples so far.
     pub(crate) fn len(&self) -> usize {
         self.t_s.len()
     }
@@ -241,7 +238,6 @@ const FROM_OUTPUTS: [(&str, &str, Reader); 11] = [
     ("turbine_heat_w", "W", |outputs| outputs.turbine.heat_w),
 ];
 
-/// Collects truth into columns.
 #[derive(Debug, Default)]
 pub struct TruthRecorder {
     from_outputs: [Vec<f64>; FROM_OUTPUTS.len()],
@@ -271,7 +267,6 @@ impl TruthRecorder {
         self.turbine_efficiency.push(turbine_efficiency);
     }
 
-    /// The columns.
     pub fn finish(self) -> Vec<TruthColumn> {
         let column = |name: &str, unit: &str, values| TruthColumn {
             name: name.to_owned(),

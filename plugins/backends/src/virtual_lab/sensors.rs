@@ -57,7 +57,6 @@ pub(crate) fn draw(seed: u64, stream: u64) -> (f64, f64) {
     (StandardNormal.sample(&mut random), StandardNormal.sample(&mut random))
 }
 
-/// The kind of an offset of a channel.
 pub(crate) fn offset_kind(channel: Channel) -> Kind {
     difference(kind_of(channel))
 }
@@ -140,7 +139,6 @@ impl ElementBank {
         }
     }
 
-    /// Columns for one batch.
     pub(crate) fn columns(&self) -> impl Iterator<Item = ElementColumn> + '_ {
         (1..=self.members.len()).map(|number| ElementColumn {
             element: Element { channel: self.channel, number },

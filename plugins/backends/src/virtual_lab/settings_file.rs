@@ -191,9 +191,6 @@ struct MachineFile {
 }
 
 /// Reads a campaign's settings for the virtual lab.
-///
-/// # Errors
-/// [`BackendError::Settings`] with the wrong key and the correct form.
 pub fn read_settings(
     settings: &serde_json::Value,
     nominal: &NominalRig,

@@ -27,7 +27,6 @@ pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
     Ok(Box::new(Instrument { settings, requests, stream: None, armed: None }))
 }
 
-/// Why a request failed.
 #[derive(Debug, thiserror::Error)]
 enum RequestError {
     #[error("{0}")]

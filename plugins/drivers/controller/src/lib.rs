@@ -24,18 +24,12 @@ pub trait Controller: Send {
     type Error: std::error::Error + Send + Sync + 'static;
 
     /// Connects, and reads every channel once.
-    ///
-    /// # Errors
-    /// If the controller cannot be reached, or a channel cannot be read.
     fn open(&mut self) -> Result<(), Self::Error>;
 
     /// Reads all channels for the sample at `t_s`, s since arming. Omits a channel that could not be read, and returns the reason.
     fn read(&mut self, t_s: f64) -> (BTreeMap<Channel, Reading>, Option<Self::Error>);
 
     /// Writes these values, SI, one after the other in this order.
-    ///
-    /// # Errors
-    /// If a value was not written.
     fn write(&mut self, values: &[(Target, f64)]) -> Result<(), Self::Error>;
 
     /// Address and number format of a channel, for messages.

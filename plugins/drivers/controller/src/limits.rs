@@ -221,7 +221,6 @@ pub fn is_plausible(channel: Channel, value: f64) -> bool {
     !value.is_finite() || measurable(channel.info().dimension).contains(&value)
 }
 
-/// Checks the first readings, SI.
 pub(crate) fn check_readings(
     controller: &impl Controller,
     readings: impl Iterator<Item = (Channel, f64)>,

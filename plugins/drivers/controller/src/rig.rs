@@ -74,9 +74,6 @@ pub struct Stand {
 
 impl Stand {
     /// Checks the settings that every stand needs.
-    ///
-    /// # Errors
-    /// Key path and reason.
     pub fn check(&self) -> Result<(), (String, LimitError)> {
         let at = |path: &str| {
             let path = path.to_owned();

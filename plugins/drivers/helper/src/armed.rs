@@ -82,7 +82,6 @@ const ATMOSPHERE_PA: f64 = 105e3;
 /// Time after the end of the trajectory at which a driver without a host stops repeating the command, s.
 const GIVE_UP_AFTER_S: f64 = 20.0;
 
-/// A safe trajectory in progress.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Descent {
     from: Option<Setpoints>,
@@ -92,7 +91,6 @@ pub(crate) struct Descent {
     cut: bool,
 }
 
-/// Progress of the trajectory.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum DescentState {
     /// No command is due.

@@ -10,7 +10,6 @@ use mapper_driver_host::protocol::{
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-/// Makes the rig.
 pub(crate) type OpenRig = Box<dyn FnOnce(&Value) -> Result<Box<dyn Backend>, BackendError>>;
 
 /// Maximum run time of a simulated rig, s: beyond it the steps of a run-down would be lost to rounding.
@@ -28,7 +27,6 @@ pub(crate) struct Server {
     frame_limit_bytes: u32,
     /// The host has disconnected: end when the rig is safe.
     is_leaving: bool,
-    /// Messages to send.
     pub(crate) out: Vec<Message>,
 }
 
@@ -48,7 +46,6 @@ impl Server {
         }
     }
 
-    /// Maximum frame size of the host, bytes.
     pub(crate) fn frame_limit_bytes(&self) -> u32 {
         self.frame_limit_bytes
     }
@@ -139,7 +136,6 @@ impl Server {
         Ok(json!({}))
     }
 
-    /// The rig, if it is armed.
     fn armed_rig(&mut self) -> Result<(&mut dyn Backend, &RigDescription, &mut Armed), Refusal> {
         let (Some((rig, description)), Some(armed)) = (&mut self.rig, &mut self.armed) else {
             return Err(refusal(Code::OutOfOrder, "the rig is not armed"));

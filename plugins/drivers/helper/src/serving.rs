@@ -16,7 +16,6 @@ pub(crate) const QUEUE_LENGTH: usize = 256;
 /// Maximum wait, s.
 const MAX_WAIT_S: f64 = 3600.0;
 
-/// An event of the driver.
 pub(crate) enum DriverEvent {
     /// A host has connected to the socket.
     #[cfg(unix)]

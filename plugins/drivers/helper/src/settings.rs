@@ -11,9 +11,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Reads `127.0.0.1:5020`, for `#[serde(deserialize_with = "mapper_driver::address")]`. Host names are refused: a look-up may hang, and
 /// every call of a driver must return in time.
-///
-/// # Errors
-/// If it is not an address; the message shows the format.
 pub fn address<'de, D: Deserializer<'de>>(from: D) -> Result<SocketAddr, D::Error> {
     let text = String::deserialize(from)?;
     text.parse().map_err(|_| D::Error::custom(remedy(&text)))
@@ -34,9 +31,6 @@ fn remedy(text: &str) -> String {
 
 /// Reads a map from channels, for `#[serde(deserialize_with = "mapper_driver::by_channel")]`. Its keys are read as text: otherwise
 /// `serde_path_to_error` would report an error at `read.?.node`.
-///
-/// # Errors
-/// If a key is not a channel or is repeated, or if a value is invalid.
 pub fn by_channel<'de, T, D>(from: D) -> Result<BTreeMap<Channel, T>, D::Error>
 where
     T: Deserialize<'de>,

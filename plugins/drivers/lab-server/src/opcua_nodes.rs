@@ -39,12 +39,9 @@ pub enum ServeError {
     NotBuilt(String),
 }
 
-/// The stand and the clock of its readings.
 #[derive(Clone)]
 pub struct Shared {
-    /// The stand.
     pub stand: Arc<Mutex<Stand>>,
-    /// Start of its time.
     pub begun: Instant,
     /// Whether speed reads and setpoint writes are printed on standard output, with their times.
     pub stamps: bool,
@@ -66,7 +63,6 @@ impl Shared {
         })
     }
 
-    /// Prints a timestamped line.
     fn stamp(&self, message: impl std::fmt::Display) {
         if self.stamps {
             let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
@@ -122,7 +118,6 @@ fn user() -> Result<Option<(String, String)>, ServeError> {
     }
 }
 
-/// Security of sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Protection {
     /// Signed and encrypted only.

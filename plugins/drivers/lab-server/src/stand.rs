@@ -11,7 +11,6 @@ const WATCHDOG_S: f64 = 2.0;
 /// Factor on the campaign's speed limit above which the air is cut.
 const OVERSPEED: f64 = 1.05;
 
-/// Measured channels, in the order of registers.
 pub fn measured() -> Vec<Channel> {
     let is_command = |channel: Channel| channel.symbol().ends_with("_command");
     CHANNELS[..MODELLED_CHANNELS]
@@ -43,7 +42,6 @@ pub enum Target {
     Acknowledge,
 }
 
-/// A value that the stand refuses.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("{value} is outside {low} to {high}")]
 pub struct RefusedValue {
@@ -52,7 +50,6 @@ pub struct RefusedValue {
     high: f64,
 }
 
-/// The lab and its interlocks.
 pub struct Stand {
     lab: Box<dyn Backend>,
     accepts: SetpointRanges,
@@ -97,10 +94,6 @@ impl Stand {
         })
     }
 
-    /// Writes a value.
-    ///
-    /// # Errors
-    /// [`RefusedValue`] if the stand refuses the value; its state is unchanged then.
     pub fn write(&mut self, target: Target, value: f64) -> Result<(), RefusedValue> {
         let switch = SetpointRange { low: 0.0, high: 1.0 };
         let range = match target {
@@ -137,7 +130,6 @@ impl Stand {
         Ok(())
     }
 
-    /// The last written value.
     pub fn commanded(&self, target: Target) -> f64 {
         match target {
             Target::P3 => self.setpoints.p3_pa,

@@ -88,7 +88,6 @@ struct Settings {
     command_log: Option<PathBuf>,
 }
 
-/// Why the lab cannot be created.
 #[derive(Debug, thiserror::Error)]
 enum LabError {
     #[error(
@@ -101,7 +100,6 @@ enum LabError {
     CommandLog { path: PathBuf, source: std::io::Error },
 }
 
-/// The lab of a campaign.
 pub(crate) fn open(settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let settings_error = |path: &str, error: LabError| BackendError::Settings {
         backend: NAME.to_owned(),

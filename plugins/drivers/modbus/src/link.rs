@@ -13,7 +13,6 @@ use tokio_modbus::ProtocolError;
 use tokio_modbus::client::{Client, Context, tcp};
 use tokio_modbus::prelude::{ExceptionCode, Request, Response, Slave};
 
-/// Why a call failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum LinkError {
     /// The answer is late.
@@ -68,7 +67,6 @@ impl Link {
         Ok(Link { runtime, address, unit, within, deadline: None, connection: None })
     }
 
-    /// Drops the connection.
     pub(crate) fn close(&mut self) {
         self.connection = None;
     }

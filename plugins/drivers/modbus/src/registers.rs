@@ -12,7 +12,6 @@ const MAX_GAP: u16 = 8;
 pub(crate) struct Block {
     /// Address of the first one.
     pub(crate) start: u16,
-    /// Number of registers.
     pub(crate) count: u16,
 }
 
@@ -65,12 +64,10 @@ named_enum! {
 }
 
 impl NumberFormat {
-    /// Whether it is an integer format.
     pub(crate) fn is_whole(self) -> bool {
         !matches!(self, NumberFormat::F32 | NumberFormat::F64)
     }
 
-    /// Number of registers.
     pub(crate) fn count(self) -> u16 {
         match self {
             NumberFormat::U16 | NumberFormat::I16 => 1,

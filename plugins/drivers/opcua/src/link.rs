@@ -31,7 +31,6 @@ const RETRY: (Duration, Duration) = (Duration::from_millis(250), Duration::from_
 /// A server that is silent for this many seconds gets a new connection.
 const MAX_SILENCE_S: u64 = 4;
 
-/// Why a call failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum LinkError {
     #[error("{server} did not answer within {} ms", within.as_millis())]
@@ -78,7 +77,6 @@ enum State {
     Failed(StatusCode),
 }
 
-/// The answer to a read.
 pub(crate) struct Answer {
     /// One value for each requested node.
     pub(crate) values: Vec<DataValue>,
@@ -133,7 +131,6 @@ fn client(store: &Store, tries: i32) -> Result<Client, String> {
     built.client().map_err(|errors| errors.join("; "))
 }
 
-/// The endpoints of a server.
 pub(crate) async fn endpoints(store: &Store, endpoint: &str) -> Result<Vec<EndpointDescription>, LinkError> {
     let failed = |message: String| LinkError::Failed { server: server(endpoint).to_owned(), message };
     let client = client(store, 0).map_err(failed)?;
@@ -222,7 +219,6 @@ impl Link {
         Ok(found)
     }
 
-    /// Makes the session.
     pub(crate) fn open(&mut self) -> Result<(), LinkError> {
         self.close();
         let until = Instant::now() + OPEN_TIMEOUT;
@@ -278,7 +274,6 @@ impl Link {
         })
     }
 
-    /// Why the session was refused.
     fn login_error(&self, status: StatusCode, certificate_path: Option<PathBuf>) -> LinkError {
         let (server, message) = (self.server(), describe_status(status));
         match status {
@@ -318,7 +313,6 @@ impl Link {
         }
     }
 
-    /// Reads an attribute of each of these nodes.
     pub(crate) fn read(&mut self, nodes: &[NodeId], attribute: AttributeId) -> Result<Answer, LinkError> {
         let wanted: Vec<ReadValueId> = nodes
             .iter()
@@ -420,7 +414,6 @@ impl Link {
         Instant::now() + if is_heartbeat { self.within } else { WRITE_TIMEOUT }
     }
 
-    /// Closes the session.
     pub(crate) fn close(&mut self) {
         if let Some(open) = self.open.take() {
             let _ = self

@@ -19,9 +19,6 @@ const SESSION_TIMEOUT_MS: f64 = 10_000.0;
 const PORT: u16 = 4840;
 
 /// Checks by a plain connection that a server listens at `HOST` or `HOST:PORT`: the library reports only a status code.
-///
-/// # Errors
-/// An error of the connection.
 pub(crate) async fn check_reachable(server: &str) -> std::io::Result<()> {
     let has_port = server.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
     let place = if has_port { server.to_owned() } else { format!("{server}:{PORT}") };
@@ -29,9 +26,6 @@ pub(crate) async fn check_reachable(server: &str) -> std::io::Result<()> {
 }
 
 /// Logs in and out immediately.
-///
-/// # Errors
-/// Why the login was refused.
 pub(crate) async fn try_login(
     client: &Client,
     endpoint: &EndpointDescription,

@@ -15,7 +15,6 @@ pub(crate) const APPLICATION_URI: &str = "urn:mapper:backend:opcua";
 const VALID_DAYS: u32 = 10 * 365;
 const KEY_BITS: u32 = 2048;
 
-/// Why a certificate is unavailable.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum StoreError {
     #[error("set MAPPER_STATE_DIR or HOME: the certificates have no directory")]
@@ -40,7 +39,6 @@ pub(crate) enum StoreError {
 /// Its directory name below the user's state.
 const DIRECTORY: &str = "opcua";
 
-/// The directory of certificates.
 #[derive(Debug, Clone)]
 pub(crate) struct Store {
     root: PathBuf,
@@ -199,7 +197,6 @@ pub(crate) fn is_number(value: &Variant) -> bool {
         && (matches!(value, Variant::Float(_) | Variant::Double(_)) || !number(value).is_nan())
 }
 
-/// Whether the type is an integer type.
 pub(crate) fn is_whole(value: &Variant) -> bool {
     !matches!(value, Variant::Float(_) | Variant::Double(_))
 }

@@ -151,7 +151,6 @@ impl Program {
         Ok(Numbers(self.parameters.iter().map(|name| values.get(name)).collect::<Result<_, _>>()?))
     }
 
-    /// Whether the script defines no hook.
     pub(super) fn has_no_hook(&self) -> bool {
         self.defined.is_empty()
     }

@@ -15,7 +15,6 @@ const LAG_FORM: &str = "//! lag: CHANNEL PARAMETER";
 /// Notation of a parameter.
 const PARAMETER_FORM: &str = "//! parameter: NAME [UNIT] LOW .. HIGH, neutral VALUE, step VALUE";
 
-/// The contents of a header.
 pub(super) struct Header {
     pub info: EffectInfo,
     /// Sensor lags, each with the parameter that holds its time constant.

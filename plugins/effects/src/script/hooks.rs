@@ -10,7 +10,6 @@ use std::sync::{Arc, OnceLock};
 pub(super) struct ScriptHooks {
     program: Arc<Program>,
     numbers: Numbers,
-    /// Whether each of [`HOOK_NAMES`] is defined.
     defined: [bool; HOOK_NAMES.len()],
     /// Name of the function for each channel that has one.
     readings: [Option<String>; CHANNELS.len()],
@@ -27,7 +26,6 @@ impl ScriptHooks {
         ScriptHooks { program, numbers, defined, readings, fault: OnceLock::new() }
     }
 
-    /// The result of hook `index` for `value`.
     fn change(&self, index: usize, site: &Site<'_>, value: f64) -> f64 {
         if !self.defined[index] {
             return value;
@@ -36,7 +34,6 @@ impl ScriptHooks {
         self.program.call(HOOK_NAMES[index].0, arguments, &self.fault)
     }
 
-    /// The term from hook `index`.
     fn add(&self, index: usize, site: &Site<'_>) -> f64 {
         if !self.defined[index] {
             return 0.0;

@@ -17,14 +17,12 @@ const MIN_CHANGE_SHARE: f64 = 0.5;
 /// Maximum further numbers in a row, such as a quality, in addition to time, name and value.
 const MAX_FURTHER_NUMBERS: usize = 2;
 
-/// Columns of a table in long form.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LongForm {
     /// Time, in one column or in two.
     clock: Vec<usize>,
     name: usize,
     value: usize,
-    /// First row of data in the file.
     data_row: usize,
     /// Header of the table with a column for each quantity: the clock, then names with units.
     header: Vec<String>,

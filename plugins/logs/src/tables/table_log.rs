@@ -7,7 +7,6 @@ use crate::tables::table_row::{Cell, Cells, RowSorter, Rows};
 use mapper_recording::logs::{Column, Layout, LogError, LogFinding, LogOptions, Row, RowSink};
 use std::collections::BTreeMap;
 
-/// Reads the rows of one group.
 struct GroupReader {
     group: usize,
     clock: ClockReader,
@@ -39,7 +38,6 @@ impl Cells for CellsWithUnits<'_> {
     }
 }
 
-/// The analysis of a table.
 #[derive(Debug)]
 pub(crate) struct Table {
     pub(crate) layout: Layout,
@@ -52,7 +50,6 @@ pub(crate) struct Table {
     cell_units: BTreeMap<usize, String>,
 }
 
-/// Source of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Origin {
     /// A text or a sheet: its head is in rows.
@@ -107,7 +104,6 @@ impl Table {
         of.filter(|(_, group)| group.is_none()).map(|(column, _)| column).collect()
     }
 
-    /// Index of the first row of data.
     pub(crate) fn data_row(&self) -> usize {
         self.data_row
     }

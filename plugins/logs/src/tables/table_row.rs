@@ -6,7 +6,6 @@ use mapper_table::{
 };
 use std::collections::VecDeque;
 
-/// The content of a cell.
 pub(crate) enum Cell<'a> {
     Empty,
     Number(f64),
@@ -15,7 +14,6 @@ pub(crate) enum Cell<'a> {
     Instant(Instant),
 }
 
-/// The cells of a row.
 pub(crate) trait Cells {
     fn cell(&self, column: usize) -> Cell<'_>;
 
@@ -41,7 +39,6 @@ pub(crate) trait Cells {
         }
     }
 
-    /// The date or time of day in a cell.
     fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
         match self.cell(column) {
             Cell::Instant(instant) => Some(instant),
@@ -70,7 +67,6 @@ impl RowStream {
         Ok(RowStream { file: file.clone(), rows, decimal: dialect.decimal })
     }
 
-    /// The cells of the row as text.
     pub(crate) fn texts(&self) -> Vec<String> {
         self.rows.texts()
     }
@@ -111,7 +107,6 @@ impl RowSorter {
         if self.rows.len() > BUFFERED_ROWS { self.rows.pop_front() } else { None }
     }
 
-    /// The buffered rows.
     pub(crate) fn rest(self) -> impl Iterator<Item = (f64, Vec<f64>)> {
         self.rows.into_iter()
     }

@@ -128,9 +128,6 @@ pub(crate) struct TableFile {
 
 impl MachineFile {
     /// The machine with the map of the file, and the T2 probe declared for its sensors.
-    ///
-    /// # Errors
-    /// If the map file can no longer be read.
     pub(crate) fn machine(
         self,
         probe_diameter_m: f64,

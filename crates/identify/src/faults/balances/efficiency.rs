@@ -15,7 +15,6 @@ use nalgebra::{DMatrix, DVector};
 /// Efficiencies and heat-transfer coefficients as fitted, before the smoothness prior.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FittedEfficiencies {
-    /// Positions of the steps.
     pub(crate) positions: Vec<usize>,
     /// Fractions.
     pub(crate) eta: FittedQuantity,

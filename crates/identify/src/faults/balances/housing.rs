@@ -33,7 +33,6 @@ const UNEVEN_K: f64 = 0.35;
 /// The same for the part that develops over the run as it warms up, K. Bound: a housing of two walls makes up to 3 K.
 const UNEVEN_DRIFT_K: f64 = 1.0;
 
-/// A part of a step.
 struct Part {
     slope_k_s: f64,
     t1_k: f64,

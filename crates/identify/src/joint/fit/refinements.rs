@@ -22,7 +22,6 @@ use std::collections::BTreeMap;
 /// The joint distribution of the parameters with a prior.
 #[derive(Debug, Clone)]
 pub(crate) struct Refinements {
-    /// Indices of the shared parameters.
     pub(crate) indices: Vec<usize>,
     pub(crate) mixture: Mixture,
     /// Current values, as differences from the declared values.

@@ -140,7 +140,6 @@ impl DampedFit for Descent<'_, '_> {
 pub(crate) struct Covariance {
     /// Indices of the fitted shared parameters.
     pub(crate) fitted: Vec<usize>,
-    /// Their covariance.
     pub(crate) shared: DMatrix<f64>,
     /// For each step: covariance of its own parameters with the shared ones free, and of own with shared.
     pub(crate) own: Vec<(Matrix4<f64>, Matrix4xX<f64>)>,
@@ -220,12 +219,10 @@ impl Covariance {
 }
 
 impl Problem<'_> {
-    /// The fitted parameters.
     pub(crate) fn fitted(&self) -> Vec<usize> {
         (0..SHARED).filter(|index| self.active[*index]).collect()
     }
 
-    /// The parameters of each step.
     pub(crate) fn locals(&self) -> Vec<LocalVector> {
         self.members.iter().map(|member| member.local).collect()
     }
@@ -407,7 +404,6 @@ impl Problem<'_> {
         self.shared_cost(shared) + sharing.map(|(_, cost)| cost).sum::<f64>()
     }
 
-    /// The sum of squares at the current parameters.
     pub(crate) fn square(&self) -> f64 {
         self.cost(&self.shared, &self.locals())
     }

@@ -203,7 +203,6 @@ fn step_blocks(series: &Series, start_s: f64, end_s: f64) -> Vec<(f64, f64)> {
     (0..count).filter_map(block).collect()
 }
 
-/// The fit with its start values.
 pub(crate) fn problem<'a>(
     steps: &'a [StepRows],
     alone: &[Estimate],

@@ -13,7 +13,6 @@ use std::ops::Range;
 #[derive(Debug, Clone)]
 struct EndBlock {
     title: String,
-    /// Indices of the rows.
     rows: Range<usize>,
     /// Number of rows with numbers.
     count: usize,
@@ -22,10 +21,8 @@ struct EndBlock {
     is_read: bool,
 }
 
-/// All such blocks of a table.
 pub(crate) struct EndBlocks(Vec<EndBlock>);
 
-/// What a row below the headings is for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum RowUse {
     /// Point or title of a speed line.
@@ -37,7 +34,6 @@ pub(crate) enum RowUse {
 }
 
 impl EndBlocks {
-    /// Finds the blocks below the headings of a layout.
     pub(crate) fn of(grid: &Grid, described: &DescribedColumns, layout: &Layout) -> EndBlocks {
         let above = layout.first_row.checked_sub(1).and_then(|above| grid.rows.get(above));
         let repeats_units = |row: &GridRow| above.is_some_and(|above| above.cells.starts_with(&row.cells));
@@ -104,7 +100,6 @@ impl EndBlocks {
         }
     }
 
-    /// A remark on each block.
     pub(crate) fn remarks(&self) -> impl Iterator<Item = ImportRemark> + '_ {
         self.0.iter().map(|block| match block.is_read {
             true => ImportRemark::SurgeLine { points: block.count },
@@ -151,7 +146,6 @@ impl EndBlock {
         rows.iter().filter(has_number).map(number).collect()
     }
 
-    /// The speeds of its rows.
     fn speeds(&self, grid: &Grid, layout: &Layout) -> Vec<Option<f64>> {
         let group = layout.groups.first();
         let column = group.and_then(|group| group.columns.get(group.speed_column()?));

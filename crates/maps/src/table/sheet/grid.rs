@@ -7,7 +7,6 @@ use mapper_table::{
 };
 use std::io::Cursor;
 
-/// A row of cells.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct GridRow {
     /// Line of the file or row of the sheet, from 1.
@@ -29,7 +28,6 @@ impl GridRow {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Grid {
     pub(crate) rows: Vec<GridRow>,
-    /// Whether numbers have a decimal comma.
     pub(crate) has_decimal_comma: bool,
     /// Whether blanks separate the cells, so that no cell can be empty.
     pub(crate) is_blank_separated: bool,
@@ -46,9 +44,6 @@ const MAX_LINE_BYTES: usize = 16 * MAX_CELLS;
 const SEPARATOR_ROWS: usize = 1000;
 
 /// Text in any encoding.
-///
-/// # Errors
-/// [`ImportError::NotText`] if it has control characters, as other files have.
 pub fn text_of(bytes: &[u8]) -> Result<String, ImportError> {
     let (encoding, mark) = TextEncoding::guess(bytes);
     let text = encoding.decode(bytes.get(mark..).unwrap_or_default());
@@ -69,7 +64,6 @@ impl Grid {
         Grid { rows, is_blank_separated: false, ..*self }
     }
 
-    /// The cells of a text.
     pub(crate) fn of_text(text: &str) -> Result<Grid, ImportError> {
         let too_many = |line| ImportError::TooMany { line, limit: MAX_ROWS };
         let (mut content, mut comments, mut comment_lines) = (String::new(), String::new(), Vec::new());
@@ -155,7 +149,6 @@ impl Grid {
         Some(Grid { rows: (0..width).map(transposed_row).collect(), ..*self })
     }
 
-    /// The cells as CSV.
     pub(crate) fn csv(&self) -> String {
         let cell = |cell: &String| {
             // In a file with decimal points, the comma of such a text would separate thousands.
@@ -191,7 +184,6 @@ fn split_comment(line: &str) -> (&str, &str) {
     line.split_once('#').unwrap_or((line, ""))
 }
 
-/// Number of cells that are numbers.
 pub(crate) fn count_number_cells(cells: &[String]) -> usize {
     let grid = Grid::of_rows(Vec::new());
     cells.iter().filter(|cell| !is_missing_mark(cell) && grid.number(cell).is_some()).count()

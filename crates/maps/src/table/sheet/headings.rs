@@ -9,7 +9,6 @@ use mapper_table::{ColumnName, Word, bare_unit, header_unit, is_dimensionless, i
 use mapper_yaml::units::{Kind, Unit};
 use std::ops::RangeInclusive;
 
-/// A row of headings.
 pub(crate) struct Headings {
     /// The cells, with the machine of a merged cell above them.
     pub(crate) names: Vec<String>,

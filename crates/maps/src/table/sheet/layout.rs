@@ -28,7 +28,6 @@ impl Group {
         self.columns.split_at(self.columns.len() - self.shared).0
     }
 
-    /// Position of the speed among the columns.
     pub(crate) fn speed_column(&self) -> Option<usize> {
         self.columns
             .iter()
@@ -64,7 +63,6 @@ impl Group {
     }
 }
 
-/// Layout of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Layout {
     pub(crate) groups: Vec<Group>,
@@ -87,7 +85,6 @@ impl Layout {
         self.groups.iter().any(Group::is_measured)
     }
 
-    /// Whether the columns are those of a turbine alone.
     pub(crate) fn is_turbine_alone(&self) -> bool {
         let is_turbine = |group: &Group| {
             if group.is_measured() {
@@ -126,9 +123,6 @@ pub(crate) fn detect_layout<'a>(
 }
 
 /// The layout of a table; `None` if it has no rows of numbers.
-///
-/// # Errors
-/// [`ImportError`] if flow or pressure ratio has no heading, a unit is unknown, or the map is a turbine's.
 fn layout(grid: &Grid, described: &DescribedColumns) -> Result<Option<Layout>, ImportError> {
     if let Some(layout) = layout_by_column_numbers(grid, described)? {
         return Ok(Some(layout));
@@ -265,7 +259,6 @@ pub(crate) fn columns(described: &DescribedColumns, cells: &[String]) -> Result<
     Ok(columns)
 }
 
-/// Whether a row names columns.
 pub(crate) fn is_heading(described: &DescribedColumns, row: &GridRow) -> bool {
     let named = |cell: &&String| {
         cell.contains(char::is_alphabetic) && !matches!(column(0, cell, described.machine), Ok(None))
@@ -433,7 +426,6 @@ pub(crate) fn vane_of_title(grid: &Grid, described: &DescribedColumns, row: &Gri
     (words.len() <= 5 && words.iter().any(|word| is_vane(word))).then_some(factor * number)
 }
 
-/// The layout of a table whose columns are described by their numbers.
 fn layout_by_column_numbers(
     grid: &Grid,
     described: &DescribedColumns,

@@ -51,7 +51,6 @@ impl Point<'_> {
 /// Mark of the format `fitted` for a node beyond the measured points.
 const EXTRAPOLATED: &str = "extrapolated";
 
-/// The points of a table.
 pub(crate) fn points<'a>(
     grid: &Grid,
     described: &DescribedColumns,
@@ -171,7 +170,6 @@ fn values(
     Ok(values)
 }
 
-/// The end of a speed line that a cell names.
 fn end_of_line(row: &GridRow) -> Option<LineEnd> {
     row.cells.iter().find_map(|cell| end_in(cell))
 }
@@ -232,7 +230,6 @@ const SPEEDS_RPM: Range<f64> = 5e3..1e6;
 /// Rows between the title of a matrix and its values. Bound: names of the axes, units.
 const MAX_HEAD_ROWS: usize = 4;
 
-/// The quantity that a title names.
 pub(crate) fn quantity_of_title(cell: &str) -> Option<Column> {
     let found = column(0, cell, Machine::Compressor).ok().flatten();
     found.filter(|found| MATRIX_QUANTITIES.contains(&found.quantity))

@@ -10,9 +10,6 @@ use std::borrow::Cow;
 use std::io::{Cursor, Read};
 
 /// The cells of the named sheet, else of the first visible sheet with a table of numbers, else of a hidden one.
-///
-/// # Errors
-/// [`ImportError::Workbook`] if it is not a workbook, unpacks to more than a map needs, or has no such sheet.
 pub(crate) fn grid_of_workbook(bytes: &[u8], wanted: Option<&str>) -> Result<Grid, ImportError> {
     let mut sheets = sheets_of(bytes)?;
     let has_table =
@@ -85,7 +82,6 @@ struct Sheet {
 /// Maximum number of cells of a sheet, empty ones between others included. Bound: 100 000 points with 40 columns.
 const MAX_SHEET_CELLS: usize = 40 * MAX_ROWS;
 
-/// All sheets of a workbook.
 fn sheets_of(bytes: &[u8]) -> Result<Vec<Sheet>, ImportError> {
     let failed = |problem: String| ImportError::Workbook { problem };
     let limits = XlsxLimits { unpacked_bytes: MAX_UNPACKED_BYTES, memory_bytes: MAX_UNPACKED_BYTES };
@@ -149,9 +145,6 @@ pub fn file_text(bytes: &[u8]) -> Result<String, ImportError> {
 }
 
 /// One text of files with a speed line each, named after its speed or as the surge line (`45000.csv`, `surge.csv`), as digitisers write them.
-///
-/// # Errors
-/// [`ImportError`] for other names, and for files that are not text.
 pub fn text_of_lines(files: &[(String, Vec<u8>)]) -> Result<String, ImportError> {
     let mut lines: Vec<(f64, String)> = Vec::new();
     for (name, bytes) in files {
@@ -181,9 +174,6 @@ pub fn text_of_lines(files: &[(String, Vec<u8>)]) -> Result<String, ImportError>
 }
 
 /// Unpacks a gzip file; returns any other content unchanged.
-///
-/// # Errors
-/// [`ImportError`] if it is broken or unpacks to more than a map needs.
 pub fn unpack(bytes: &[u8]) -> Result<Cow<'_, [u8]>, ImportError> {
     if !bytes.starts_with(&[0x1f, 0x8b]) {
         return Ok(Cow::Borrowed(bytes));

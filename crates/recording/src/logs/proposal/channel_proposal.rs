@@ -320,7 +320,6 @@ impl fmt::Display for ProposalRemark {
 }
 
 impl ProposalRemark {
-    /// The sentence of a check of the readings.
     fn write_check(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         use ProposalRemark as Remark;
         match self {

@@ -22,18 +22,15 @@ const MAX_ENGINE_RPM: f64 = 8e3;
 /// Channels that most logs name by station numbers.
 const NUMBERED: [Channel; 6] = [Channel::P2, Channel::T2, Channel::P3, Channel::T3, Channel::P4, Channel::T4];
 
-/// Results of the checks.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Agreement {
     /// Number of pairs of channels that agree.
     pub(super) agreeing: usize,
-    /// Number of pairs that contradict.
     pub(super) contradicting: usize,
     /// Whether the log may number its stations differently.
     pub(super) suspects_numbering: bool,
 }
 
-/// Checks the proposal and adds remarks.
 pub(super) fn check(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -> Agreement {
     let mut agreement = Agreement::default();
     decide_bare_housing(proposal, layout, survey);

@@ -15,7 +15,6 @@ use mapper_yaml::units::{Kind, Unit};
 /// Minimum reading of an absolute outlet pressure if the inlet is gauge, Pa. Bound: gauge readings at idle are lower, as are absolute ones.
 const MAX_GAUGE_MIN_PA: f64 = 1.6e5;
 
-/// A column as a candidate for a channel.
 struct Candidate {
     column: usize,
     weight: Weight,
@@ -54,7 +53,6 @@ fn has_fifth_station(layout: &Layout) -> bool {
     layout.columns.iter().any(is_fifth)
 }
 
-/// Station numbers in the names of a log.
 #[derive(Clone, Copy, PartialEq)]
 enum StationNumbering {
     /// Compressor 1 and 2, turbine 3 and 4.
@@ -136,7 +134,6 @@ fn propose_with_numbering(
     (proposal, agreement)
 }
 
-/// Channels that a column may be, by its name and description.
 fn channels_by_name(
     index: usize,
     layout: &Layout,

@@ -182,7 +182,6 @@ pub(super) fn infer_flow_unit(
     }
 }
 
-/// Whether all pressure ratios are possible for a compressor.
 fn ratios_are_possible(channels: &[(Channel, f64, f64)], unit: &Unit) -> bool {
     let inlet = channels.iter().find(|(channel, ..)| *channel == Channel::P1);
     let inlet_pa = inlet.map_or(STANDARD_ATMOSPHERE_PA, |(_, low, _)| unit.to_inside(*low));

@@ -87,7 +87,6 @@ pub(crate) fn channels_of(
     found
 }
 
-/// The command channel of a measured channel.
 fn commanded(channel: Channel) -> Option<Channel> {
     let symbol = format!("{}_command", channel.symbol());
     let row = CHANNELS.iter().find(|row| row.symbol == symbol);

@@ -25,7 +25,6 @@ impl ActuatorDynamics {
     }
 }
 
-/// One actuator and its position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Actuator {
     dynamics: ActuatorDynamics,
@@ -35,7 +34,6 @@ pub struct Actuator {
     command: f64,
 }
 
-/// The motion from one command to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Motion {
     /// Its start, s.
@@ -57,7 +55,6 @@ impl Actuator {
         Actuator { dynamics, motions: vec![motion], command: value }
     }
 
-    /// Sends a new command at `t_s`.
     pub fn set(&mut self, t_s: f64, command: f64) {
         let change = (command - self.command).abs();
         if change == 0.0 || change < self.dynamics.dead_band {
@@ -110,7 +107,6 @@ impl Actuator {
 }
 
 impl Motion {
-    /// Position of the drive at `t_s`.
     fn drive(&self, t_s: f64, dynamics: &ActuatorDynamics) -> f64 {
         let after_s = t_s - self.since_s;
         let jump = self.command - self.start;

@@ -13,7 +13,6 @@ use rand_pcg::Pcg64;
 use serde::Deserialize;
 use std::sync::Arc;
 
-/// A slow sine wave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Wave {
     amplitude: f64,
@@ -140,7 +139,6 @@ impl LabDrift {
     }
 }
 
-/// The reading of a sensor with its drifts.
 pub fn drifted_reading(drifts: &[LabDrift], channel: Channel, t_s: f64, reading: f64) -> f64 {
     let own = drifts.iter().filter(|drift| drift.target == DriftTarget::Sensor(channel));
     own.fold(reading, |reading, drift| match channel.info().dimension {
@@ -149,7 +147,6 @@ pub fn drifted_reading(drifts: &[LabDrift], channel: Channel, t_s: f64, reading:
     })
 }
 
-/// The drifted machine at a time.
 pub fn drifted_machine(drifts: &[LabDrift], mut params: Params, t_s: f64) -> Params {
     for drift in drifts {
         let change = drift.at(t_s);

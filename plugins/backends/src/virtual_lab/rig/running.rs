@@ -49,9 +49,6 @@ pub trait Structure: std::fmt::Debug + Send + Sync {
     fn start(&self, model: &Model, t_s: f64, state: State, watch: Watch) -> Box<dyn RunningMachine>;
 
     /// A machine in steady state under `boundary`.
-    ///
-    /// # Errors
-    /// If no steady state exists, e.g. with too little air.
     fn settled(
         &self,
         model: &Model,

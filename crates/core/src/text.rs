@@ -71,9 +71,12 @@ pub fn temperature(value_k: f64) -> String {
     format!("{:.1} degC ({value_k:.1} K)", value_k - ICE_POINT_K)
 }
 
+/// Parts of a krpm that are shown. Bound: a tenth of what a speed control holds.
+const SHOWN_PER_KRPM: f64 = 100.0;
+
 /// A speed for display: in krpm, to 0.01.
 pub fn krpm(speed_rpm: f64) -> f64 {
-    (100.0 * speed_rpm / RPM_PER_KRPM).round() / 100.0
+    (SHOWN_PER_KRPM * speed_rpm / RPM_PER_KRPM).round() / SHOWN_PER_KRPM
 }
 
 /// Size above which a value is written with a power of ten. Bound: far above every reading.

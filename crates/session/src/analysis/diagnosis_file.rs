@@ -1,11 +1,11 @@
 //! The file of a diagnosis, which corrections, pages, forecasts and calibrated models read instead of diagnosing again.
 
 use crate::analysis::calibrated_model::{check_format, text_of, wrong};
-use crate::recording::files::{DIAGNOSIS_FORMAT, json_text, program_and_commit};
+use crate::recording::files::{DIAGNOSIS_FORMAT, PROGRAM, json_text};
 use crate::recording::identification_config::identification_with;
 use crate::recording::recording_file::Recorded;
 use crate::recording::run_directory;
-use crate::{Session, SessionError, StoredDiagnosisError};
+use crate::{SessionError, StoredDiagnosisError};
 use mapper_campaign::Campaign;
 use mapper_diagnose::drift::DriftReport;
 use mapper_diagnose::gap::{Found, StoredFits};
@@ -32,7 +32,6 @@ pub struct MadeFrom {
 
 impl MadeFrom {
     pub(crate) fn of(
-        session: &Session<'_>,
         recorded: &Recorded,
         (campaign, map): (&Campaign, &ChannelMap),
         effects: &[Arc<dyn Effect>],
@@ -40,7 +39,7 @@ impl MadeFrom {
     ) -> Result<MadeFrom, SessionError> {
         let declared = (campaign, identification_with(campaign, map), format!("{:?}", map.redundant));
         Ok(MadeFrom {
-            program: program_and_commit(session.registry.commit),
+            program: PROGRAM.to_owned(),
             recording_sha256: sha256_hex(&serde_json::to_string(&recorded.read.recording)?),
             campaign_sha256: sha256_hex(&serde_json::to_string(&declared)?),
             // A script's text is part of it.

@@ -93,7 +93,7 @@ impl Session<'_> {
         let progress = |done_ratio: f64, what: &str| {
             self.send(SessionEvent::Progress { done_ratio, what: what.to_owned() });
         };
-        let made_from = MadeFrom::of(self, recorded, (campaign, map), &effects, baseline.is_some())?;
+        let made_from = MadeFrom::of(recorded, (campaign, map), &effects, baseline.is_some())?;
         let (recording, sensors) = fused(recorded, campaign, map)?;
         let of_baseline = |baseline: &Recorded| -> Result<BaselineRecording, SessionError> {
             let (recording, _) = fused(baseline, campaign, map)?;
@@ -187,7 +187,7 @@ impl Session<'_> {
             let why = StoredDiagnosisError::NotADiagnosis("it has no fits".to_owned());
             return Err(refused(path, why));
         };
-        let wanted = MadeFrom::of(self, recorded, (campaign, map), &effects, false)?;
+        let wanted = MadeFrom::of(recorded, (campaign, map), &effects, false)?;
         made_from.check(&wanted).map_err(|error| refused(path, error))?;
         let diagnosis: Diagnosis = serde_json::from_str(&text)
             .map_err(|error| refused(path, StoredDiagnosisError::NotADiagnosis(error.to_string())))?;

@@ -190,7 +190,7 @@ def main():
 PAGE = """\
 # Orders of the same points
 
-Made on {date} by this command, a quarter of an hour on two cores; do not edit:
+Made on {date} by this command, half an hour on two idle cores; do not edit:
 
     python3 benches/orders.py --mapper target/release/mapper --write docs/validation/orders.md
 

@@ -366,7 +366,7 @@ impl SessionError {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum StoredDiagnosisError {
-    #[error("it is not a diagnosis of one recording ({0}): write one with `mapper gap diagnose --out FILE`")]
+    #[error("it is not the file of a diagnosis of one recording ({0}): diagnose the recording, and keep that file")]
     NotADiagnosis(String),
     #[error(
         "it was changed after it was written: its content does not have the SHA-256 in it; diagnose again"
@@ -382,9 +382,9 @@ pub enum StoredDiagnosisError {
         "the campaign is not the one of the diagnosis, or was changed since: give that campaign, or diagnose again"
     )]
     OtherCampaign,
-    #[error("it was made with other effects: give the same files with --effect, or diagnose again")]
+    #[error("it was made with other effects: give the same files of effects, or diagnose again")]
     OtherEffects,
-    #[error("it has only the changes since a reference recording: diagnose without --baseline")]
+    #[error("it has only the changes since a reference recording: diagnose without one")]
     WithBaseline,
     #[error(transparent)]
     Restore(#[from] RestoreError),

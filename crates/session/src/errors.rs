@@ -366,7 +366,9 @@ impl SessionError {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum StoredDiagnosisError {
-    #[error("it is not the file of a diagnosis of one recording ({0}): diagnose the recording, and keep that file")]
+    #[error(
+        "it is not the file of a diagnosis of one recording ({0}): diagnose the recording, and keep that file"
+    )]
     NotADiagnosis(String),
     #[error(
         "it was changed after it was written: its content does not have the SHA-256 in it; diagnose again"

@@ -261,6 +261,7 @@ pub fn command_for(error: &E) -> Option<String> {
             return Some(format!("`mapper run --resume {} --repeat-lost`", run.display()));
         }
         E::StalePlan { .. } | E::InvalidPlan { .. } => "`mapper plan CAMPAIGN --out FILE`",
+        E::StoredDiagnosis { .. } => "`mapper gap diagnose --out FILE`",
         E::UnknownOutputFormat { .. } => "`--to FORMAT`",
         E::FirstMap(error) if matches!(**error, FirstMapError::NotAMap(..)) => "`mapper map convert`",
         E::Fmu(FmuExportError::Platform | FmuExportError::Compiler { .. }) => "without `--compile`",

@@ -60,8 +60,9 @@ fn a_kept_diagnosis_corrects_as_a_new_one_and_only_its_own_recording() {
     let refused = |name: &str, text: &str, campaign: &Path, recording: &Path| {
         let file = scratch.path().join(name);
         std::fs::write(&file, text).unwrap();
-        let said = correct(campaign, recording, &["--diagnosis".as_ref(), file.as_os_str()]).exits(3).stderr;
-        assert!(said.contains(name) && said.contains("diagnos"), "{said}");
+        let message =
+            correct(campaign, recording, &["--diagnosis".as_ref(), file.as_os_str()]).exits(3).stderr;
+        assert!(message.contains(name) && message.contains("diagnos"), "{message}");
     };
     let probability = text.find("\"probability\": 0.").unwrap() + "\"probability\": 0.".len();
     let mut tampered = text.clone();
@@ -108,11 +109,11 @@ fn a_stopped_diagnosis_leaves_nothing() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let mut said = BufReader::new(running.stderr.take().unwrap()).lines().map(Result::unwrap);
-    said.find(|line| line.contains("single effects")).unwrap();
+    let mut messages = BufReader::new(running.stderr.take().unwrap()).lines().map(Result::unwrap);
+    messages.find(|line| line.contains("single effects")).unwrap();
     let id = running.id().to_string();
     Command::new("sh").args(["-c", "kill -INT \"$1\"", "sh", &id]).status().unwrap();
-    assert!(said.any(|line| line.contains("stopped by the operator")));
+    assert!(messages.any(|line| line.contains("stopped by the operator")));
     assert_eq!(running.wait().unwrap().code(), Some(130));
     let left = std::fs::read_dir(scratch.path()).unwrap().map(|entry| entry.unwrap().file_name());
     assert_eq!(left.collect::<Vec<_>>(), ["night.mcap"]);

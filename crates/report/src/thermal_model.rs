@@ -34,8 +34,18 @@ impl Describe for ThermalModel {
             if let Some((share, conductance)) =
                 housing.inner_capacity_ratio.as_ref().zip(housing.inner_conductance_w_k.as_ref())
             {
-                row("inner wall: share of the heat capacity", share, 1.0, "", 3);
-                row("inner wall: conductance to the rest", conductance, 1.0, "W/K", 1);
+                let part = if housing.outer_area_ratio.is_some() { "second part" } else { "inner wall" };
+                row(&format!("{part}: share of the heat capacity"), share, 1.0, "", 3);
+                row(&format!("{part}: conductance to the rest"), conductance, 1.0, "W/K", 1);
+            }
+            if let Some(share) = &housing.outer_area_ratio {
+                row("part with Tc: share of the area that the gas touches", share, 1.0, "", 3);
+            }
+            if let Some((share, conductance)) =
+                housing.third_capacity_ratio.as_ref().zip(housing.third_conductance_w_k.as_ref())
+            {
+                row("third part: share of the capacity outside the second", share, 1.0, "", 3);
+                row("third part: conductance to the part with Tc", conductance, 1.0, "W/K", 1);
             }
             row("lag of Tc", &housing.tc_lag_s, 1.0, "s", 2);
             row("heat from another source at 330 K", &housing.other_heat_w, 1.0, "W", 1);

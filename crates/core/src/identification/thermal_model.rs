@@ -131,10 +131,20 @@ pub struct IdentifiedInlet {
 pub struct IdentifiedHousing {
     /// Heat capacity over the declared one.
     pub capacity_ratio: SharedValue,
-    /// Share of the heat capacity in an inner wall with its own temperature; `None` if the housing is one node.
+    /// Share of the heat capacity in an inner wall, or another part, with its own temperature; `None` if the housing is one node.
     pub inner_capacity_ratio: Option<SharedValue>,
-    /// Conductance between that wall and the rest, W/K.
+    /// Conductance between that part and the one with the thermocouple, W/K.
     pub inner_conductance_w_k: Option<SharedValue>,
+    /// Share of the part with the thermocouple in the area that the gas touches; `None` if the housing is one node, or an inner wall has
+    /// all of the area.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outer_area_ratio: Option<SharedValue>,
+    /// Share of a third part in the capacity that the second does not have; `None` if there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub third_capacity_ratio: Option<SharedValue>,
+    /// Conductance between the third part and that with the thermocouple, W/K.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub third_conductance_w_k: Option<SharedValue>,
     /// Conductance between housing and gas before the wheel that does not follow the law of h, W/K.
     pub inlet_conductance_w_k: SharedValue,
     /// Time constant of the thermocouple on the housing, s.

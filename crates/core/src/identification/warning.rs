@@ -201,7 +201,7 @@ kinds! {
         SlowResidual { residual_ratio: f64 },
         /// Scatter of the points about the convection law.
         Scatter { scatter_ratio: f64 },
-        /// The change of Tc is not that of a housing of one or two masses: its residual, relative to that of the declared noise, and the spread of
+        /// The change of Tc is not that of a housing of one, two or three masses: its residual, relative to that of the declared noise, and the spread of
         /// the heat that the steps' balances do not have.
         Housing { residual_ratio: f64, heat_w: f64 },
         /// Points with an impossible efficiency.

@@ -59,7 +59,10 @@ pub(crate) fn likelihood(
     balances.extend(balances::standstill::valve_rows(&opened, &noise, nominal));
     balances.extend(balances::efficiency::head_rows(&readings, &noise, reference, nominal));
     let used: Vec<bool> = all.iter().map(Option::is_some).collect();
-    balances.extend(balances::housing::rows(recording, config, &used));
+    // Its balance is that of one wall.
+    if fitted.is_none_or(|fitted| fitted.has_one_wall) {
+        balances.extend(balances::housing::rows(recording, config, &used));
+    }
     balances.extend(balances::housing::inlet_rows(recording, &all, config));
     balances.extend(fitted.and_then(|fitted| balances::efficiency::rows(fitted, &all, reference, nominal)));
     balances.extend(standstills.iter().map(|at_rest| at_rest.rows.clone()));

@@ -23,13 +23,13 @@ const POSSIBLE_ETA: std::ops::RangeInclusive<f64> = 0.05..=1.0;
 const FITTING_SQUARE: f64 = 0.8;
 /// The same of all steps, above which the model itself is doubtful. Calibrated: as above.
 const SLOW_SQUARE: f64 = 1.6;
-/// The same of Tc: above it the housing is not one or two masses. Calibrated: `benches/identification.py`; 0.8 if the model fits the rig, with a
+/// The same of Tc: above it the housing is not one, two or three masses. Calibrated: `benches/identification.py`; 0.8 if the model fits the rig, with a
 /// largest value of 0.98 in 69 recordings.
 const SLOW_TC_SQUARE: f64 = 1.25;
-/// Spread of the heat that the steps' balances do not have above which the housing is not one or two masses, W. Calibrated: as above; 2 W, the
+/// Spread of the heat that the steps' balances do not have above which the housing is not one, two or three masses, W. Calibrated: as above; 2 W, the
 /// largest 2.9 W.
 const STEP_HEAT_W: f64 = 6.0;
-/// Mean square of slow residuals above which an inner wall is tried. Bound: independent residuals have 1.
+/// Mean square of slow residuals above which more parts are tried. Bound: independent residuals have 1.
 const SUSPECT_SQUARE: f64 = 1.0;
 /// The same for the spreads of h, heat and efficiency, over the expected ones. Bound: a tenth more than noise gives.
 const SUSPECT_SPREADS: f64 = 1.1;
@@ -49,7 +49,7 @@ fn slow_square(rows: &[Row], whitened: &[f64]) -> Option<f64> {
 }
 
 /// Mean squares of segment sums of the contributing steps: of T2, and of Tc given T2.
-pub(crate) fn slow_squares(problem: &Problem<'_>) -> (f64, Option<f64>) {
+fn slow_squares(problem: &Problem<'_>) -> (f64, Option<f64>) {
     let (mut t2, mut tc) = (Vec::new(), Vec::new());
     for (member, whitened) in problem.members.iter().zip(problem.whitened()) {
         let rows = &member.history.step.rows;
@@ -71,9 +71,9 @@ pub(crate) fn fits(problem: &Problem<'_>) -> bool {
     is_near(slow, SLOW_SQUARE) && slow_tc.is_none_or(|square| is_near(square, SLOW_TC_SQUARE))
 }
 
-/// Whether a fit of one node leaves anything that an inner wall could explain. Otherwise its evidence is that of the noise, and another fit would
+/// Whether a fit of one part leaves anything that more parts could explain. Otherwise its evidence is that of the noise, and another fit would
 /// only cost time.
-pub(crate) fn may_have_inner_wall(problem: &Problem<'_>) -> bool {
+pub(crate) fn may_have_parts(problem: &Problem<'_>) -> bool {
     let (slow, slow_tc) = slow_squares(problem);
     let prior = |index: usize| problem.members.first().map_or(0.0, |member| member.priors[index].sigma);
     slow > SUSPECT_SQUARE

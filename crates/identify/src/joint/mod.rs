@@ -3,8 +3,8 @@
 //! Two things are predicted and compared with the recording: T2 by eqs. 1-3 with the measured housing temperature, and the change of that
 //! temperature within each step, by the heat that the gas gives to the housing. Each step keeps its own efficiency. The shared parameters are
 //! estimated once, from all steps: the convection law, the area share before the wheel, the probe's lag, the effect of a hotter wall,
-//! preheating in the inlet, the housing's balance, the sensors' errors, and how efficiency varies over the map. The housing is one node, or two if
-//! the recording says so. See `docs/explanation/identification.md` for the reasons, assumptions and limits.
+//! preheating in the inlet, the housing's balance, the sensors' errors, and how efficiency varies over the map. The housing is one part, or
+//! more if the recording says so. See `docs/explanation/identification.md` for the reasons, assumptions and limits.
 
 pub(crate) mod expected;
 pub(crate) mod fit;
@@ -15,8 +15,9 @@ pub(crate) mod uncertainty;
 
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::joint::fit::refinements::{Gain, Refinements};
-use crate::joint::fit::solve::{Covariance, Problem};
-use crate::joint::step_model::parameters::{INLET, LN_INNER_CONDUCTANCE, LOGIT_INNER, bounds};
+use crate::joint::fit::solve::{Covariance, Member, Problem};
+use crate::joint::step_model::parameters::{ETA, INLET, LN_INNER_CONDUCTANCE, LOGIT_INNER, bounds};
+use crate::joint::step_model::parts::{Division, Parts};
 use crate::joint::step_model::rows::{Row, StepRows};
 use crate::joint::uncertainty::{Number, Numbers};
 use crate::single_step::dynamic::{Estimate, FittedReadings};
@@ -51,8 +52,11 @@ const MAX_FROZEN_SHARE: f64 = 1.0 / 3.0;
 /// Number of samples at the limit of a sensor that distort a step. Bound: one could be an outlier, and a second one chance.
 const MIN_TOUCHES: usize = 3;
 
-/// ln of the odds above which a housing has an inner wall. Bound: 150 to 1; recordings of one node give less than 1e-9, of two more than 1e400.
-const INNER_WALL_LN_ODDS: f64 = 5.0;
+/// ln of the odds above which a housing has more parts. Bound: 150 to 1; recordings of one part give less than 1e-9, of two more than 1e80.
+const PARTS_LN_ODDS: f64 = 5.0;
+/// Share of the area on the part with the thermocouple above which the other one is no inner wall. Bound: recordings of inner walls give less
+/// than 0.05.
+const INNER_WALL_AREA: f64 = 0.25;
 
 /// The efficiency that the dynamic method (Burke et al.) finds in a step which another method has identified.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -121,7 +125,8 @@ pub(crate) fn estimate(
         }
         return Joint { estimates, thermal: None, dynamic, fitted: None };
     };
-    let fitted = uncertainty::as_measured(&attempt.problem, &steps, config);
+    let truncation = attempt.truncation.as_deref();
+    let fitted = uncertainty::as_measured(&attempt.problem, &steps, truncation, config);
     let Attempt { problem, numbers, thermal, prior_sensitivity, left_out, .. } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
     let predictions = problem.predictions(&problem.shared, &problem.locals(), None);
@@ -239,6 +244,8 @@ struct Attempt<'a> {
     thermal: ThermalModel,
     /// Error of the efficiencies if parameters shrunk to their declared values are not as declared, fraction.
     prior_sensitivity: f64,
+    /// See [`Fitted`].
+    truncation: Option<Vec<[f64; 2]>>,
     /// Reason for excluding the excluded steps, if any.
     left_out: Option<LeftOut>,
 }
@@ -257,7 +264,7 @@ impl<'a> Attempt<'a> {
                 (member.contributes, member.excluded) = (!is_frozen, *is_frozen);
             }
         }
-        let fitted = best_housing(&mut problem, config)?;
+        let fitted = best_housing(&mut problem, steps, config)?;
         Attempt::of(problem, fitted, steps, config)
     }
 
@@ -270,7 +277,8 @@ impl<'a> Attempt<'a> {
             (member.contributes, member.excluded) = (false, true);
         }
         minimise(&mut problem, config)?;
-        let fitted = Fitted::of(&mut problem, config)?;
+        let mut fitted = Fitted::of(&mut problem, config)?;
+        fitted.truncation = self.truncation.clone();
         Attempt::of(problem, fitted, steps, config)
     }
 
@@ -281,11 +289,11 @@ impl<'a> Attempt<'a> {
         config: &IdentifyConfig,
     ) -> Option<Self> {
         let numbers = fitted.numbers(&problem, steps);
-        let Fitted { covariance, refined, prior_sensitivity } = fitted;
+        let Fitted { covariance, refined, prior_sensitivity, truncation } = fitted;
         let refinements = refined.as_ref().map(|(refinements, _)| refinements);
         let thermal =
             thermal_model::thermal_model(&problem, &covariance, &numbers, refinements, steps, config);
-        Some(Attempt { problem, covariance, numbers, thermal, prior_sensitivity, left_out: None })
+        Some(Attempt { problem, covariance, numbers, thermal, prior_sensitivity, truncation, left_out: None })
     }
 
     /// The fit without the region of the map that disagrees most, if any.
@@ -317,29 +325,65 @@ struct Fitted {
     refined: Option<(Refinements, Gain)>,
     /// Dependence of the efficiencies on the declaration, fraction.
     prior_sensitivity: f64,
+    /// Change of each step's efficiency and ln h from a housing of two parts to one of three; `None` for other housings.
+    truncation: Option<Vec<[f64; 2]>>,
 }
 
-/// Fits a housing of one node and one of two, and keeps the one that the recording favours.
-fn best_housing(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<Fitted> {
-    // A fit of one node has moved its parameters to imitate a second one, so both begin at the start.
-    let mut two = fit::start::with_inner_wall(problem);
+/// Fits a housing of one part and of two, and keeps the one that the recording favours. Where the gas touches both parts, the real housing
+/// has no parts but conducts everywhere: then a third part is added, and the change that it makes is the error that is left.
+fn best_housing<'a>(
+    problem: &mut Problem<'a>,
+    steps: &'a [StepRows],
+    config: &IdentifyConfig,
+) -> Option<Fitted> {
+    // A fit of one part has moved its parameters to imitate a second one, so all begin at the start.
+    let start = problem.clone();
     minimise(problem, config)?;
-    if problem.model.has_balance && judge::may_have_inner_wall(problem) {
-        let favoured = minimise_in_stages(&mut two, config)
-            .and_then(|()| Some(two.ln_evidence()? - problem.ln_evidence()?));
-        // On a bound it is no wall, and Laplace's method does not hold there.
+    if !problem.model.has_balance || !judge::may_have_parts(problem) {
+        return Fitted::of(problem, config);
+    }
+    for parts in [Parts::Two, Parts::InnerWall] {
+        // An inner wall is the limit in which it has all of the area.
+        let two_touched = problem.model.parts == Parts::Two
+            && Division::of(Parts::Two, &problem.shared).area[0] > INNER_WALL_AREA;
+        if parts == Parts::InnerWall && two_touched {
+            continue;
+        }
+        let mut other = fit::start::with_parts(&start, parts);
+        let favoured = minimise_in_stages(&mut other, config)
+            .and_then(|()| Some(other.ln_evidence()? - problem.ln_evidence()?));
+        // On a bound it is no part, and Laplace's method does not hold there.
         let is_inside = [LOGIT_INNER, LN_INNER_CONDUCTANCE].into_iter().all(|index| {
             let (low, high) = bounds(index);
-            two.shared[index] > low && two.shared[index] < high
+            other.shared[index] > low && other.shared[index] < high
         });
-        if is_inside && favoured.is_some_and(|ln_odds| ln_odds > INNER_WALL_LN_ODDS) {
-            *problem = two;
+        if is_inside && favoured.is_some_and(|ln_odds| ln_odds > PARTS_LN_ODDS) {
+            *problem = other;
         }
     }
-    Fitted::of(problem, config)
+    if problem.model.parts != Parts::Two {
+        return Fitted::of(problem, config);
+    }
+    let before = point_values(problem, steps);
+    *problem = fit::start::with_parts(problem, Parts::Three);
+    minimise(problem, config)?;
+    let after = point_values(problem, steps);
+    let mut fitted = Fitted::of(problem, config)?;
+    let change = |(after, before): (&[f64; 2], &[f64; 2])| [after[0] - before[0], after[1] - before[1]];
+    fitted.truncation = Some(after.iter().zip(&before).map(change).collect());
+    Some(fitted)
 }
 
-/// Fits law, efficiencies and housing first, with all parameters that may be neutral as declared: far from the minimum they imitate an inner wall.
+/// Efficiency and ln h of each step.
+fn point_values(problem: &Problem<'_>, steps: &[StepRows]) -> Vec<[f64; 2]> {
+    let of = |(step, member): (&StepRows, &Member<'_>)| {
+        let h_w_m2k = problem.model.at_end(&step.end, &problem.shared, &member.local).h_w_m2k;
+        [member.local[ETA], h_w_m2k.ln()]
+    };
+    steps.iter().zip(&problem.members).map(of).collect()
+}
+
+/// Fits law, efficiencies and housing first, with all parameters that may be neutral as declared: far from the minimum they imitate another part.
 fn minimise_in_stages(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
     let sought = fit::refinements::sought(problem);
     sought.iter().for_each(|refinement| problem.active[refinement.index] = false);
@@ -376,12 +420,16 @@ impl Fitted {
             Some(found) => fit::refinements::prior_sensitivity(&open, Some(found))?,
             None => 0.0,
         };
-        Some(Fitted { covariance, refined: refinements.zip(gain), prior_sensitivity })
+        Some(Fitted { covariance, refined: refinements.zip(gain), prior_sensitivity, truncation: None })
     }
 
     fn numbers(&self, problem: &Problem<'_>, steps: &[StepRows]) -> Numbers {
         let known = self.refined.as_ref().map(|(refinements, gain)| (refinements, gain));
-        Numbers::of(problem, &self.covariance, known, steps)
+        let numbers = Numbers::of(problem, &self.covariance, known, steps);
+        match &self.truncation {
+            Some(changes) => numbers.with_truncation(changes),
+            None => numbers,
+        }
     }
 }
 

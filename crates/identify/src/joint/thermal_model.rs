@@ -6,8 +6,8 @@ use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::judge;
 use crate::joint::step_model::parameters::{
     ALPHA, EXPONENT, HEAT, HEAT_BY_TC, HOUSING, LN_AREA, LN_CAPACITY, LN_COEFFICIENT, LN_DEVIATION,
-    LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, OFFSET_CHANNELS, OFFSETS, PREHEAT,
-    PROBE_MM2, STEP_HEAT, SURFACE, TC_LAG, symbol,
+    LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LN_THIRD_CONDUCTANCE, LOGIT_AREA, LOGIT_INNER,
+    LOGIT_THIRD, OFFSET_CHANNELS, OFFSETS, PREHEAT, PROBE_MM2, STEP_HEAT, SURFACE, TC_LAG, symbol,
 };
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::uncertainty::Numbers;
@@ -94,12 +94,17 @@ type Transform<'a> = &'a dyn Fn(f64) -> f64;
 /// The housing; `of` reports a parameter.
 fn housing(problem: &Problem<'_>, of: &dyn Fn(usize, Transform<'_>) -> SharedValue) -> IdentifiedHousing {
     let same = |x: f64| x;
-    let inner =
-        |index: usize, transform: Transform<'_>| problem.model.has_inner_wall.then(|| of(index, transform));
+    let part = |index: usize, transform: Transform<'_>| {
+        problem.model.parts.parameters().contains(&index).then(|| of(index, transform))
+    };
+    let share = |logit: f64| 1.0 / (1.0 + (-logit).exp());
     IdentifiedHousing {
         capacity_ratio: of(LN_CAPACITY, &f64::exp),
-        inner_capacity_ratio: inner(LOGIT_INNER, &|logit| 1.0 / (1.0 + (-logit).exp())),
-        inner_conductance_w_k: inner(LN_INNER_CONDUCTANCE, &f64::exp),
+        inner_capacity_ratio: part(LOGIT_INNER, &share),
+        inner_conductance_w_k: part(LN_INNER_CONDUCTANCE, &f64::exp),
+        outer_area_ratio: part(LOGIT_AREA, &share),
+        third_capacity_ratio: part(LOGIT_THIRD, &share),
+        third_conductance_w_k: part(LN_THIRD_CONDUCTANCE, &f64::exp),
         inlet_conductance_w_k: of(PREHEAT, &same),
         tc_lag_s: of(TC_LAG, &same),
         other_heat_w: of(HEAT, &same),

@@ -11,6 +11,7 @@ use crate::joint::step_model::parameters::{
     LN_COEFFICIENT, LN_DEVIATION, LOCAL, OFFSET_CHANNELS, OFFSETS, PREHEAT, PROBE_MM2, REFINEMENTS, SHARED,
     SURFACE, TC_LAG, THERMOMETERS, symbol,
 };
+use crate::joint::step_model::parts::Parts;
 use crate::joint::step_model::rows::StepRows;
 use crate::single_step::budgets;
 use crate::single_step::dynamic::ReadingError;
@@ -97,6 +98,7 @@ pub(crate) fn common_part(covariance: &DMatrix<f64>, own_variances: &[f64], erro
 const NOISE: &str = "noise of the step, scatter about the law of h";
 const LAW: &str = "law of h and shape of the map";
 const BALANCE: &str = "heat balance of the housing";
+const DIVISION: &str = "housing of few parts";
 const NEUTRAL: &str = "alpha_A, probe, heating/cooling ratio, preheating and lag of Tc taken for neutral";
 
 /// Unit of a source that is given in the unit of the number.
@@ -290,6 +292,23 @@ impl Numbers {
         Numbers { eta, ln_h, common, budgets, eta_errors }
     }
 
+    /// With the error of a housing of few parts: the change of efficiency and ln h that the last part made, on both sides of each interval.
+    pub(crate) fn with_truncation(mut self, changes: &[[f64; 2]]) -> Self {
+        let numbers = [&mut self.eta, &mut self.ln_h];
+        for (k, (numbers, common)) in numbers.into_iter().zip(&mut self.common).enumerate() {
+            for (i, (number, change)) in numbers.iter_mut().zip(changes).enumerate() {
+                let size = change[k].abs();
+                number.interval = (number.interval.0 - size, number.interval.1 + size);
+                let bias = &mut number.uncertainty.bias_standard_error;
+                *bias = bias.hypot(change[k]);
+                common[i].push(change[k]);
+                let row = budgets::row(DIVISION.to_owned(), size, OWN_UNIT, 1.0, change[k]);
+                self.budgets[i][k].push(row);
+            }
+        }
+        self
+    }
+
     /// Median standard error of the efficiencies, fraction; infinite without any.
     pub(crate) fn middle_error(&self) -> f64 {
         let errors = self.eta.iter().map(|number| number.uncertainty.combined_standard_error());
@@ -383,6 +402,7 @@ pub(crate) fn together(quantities: &[Quantity], covariance: &Covariance) -> DMat
 pub(crate) fn as_measured(
     problem: &Problem<'_>,
     steps: &[StepRows],
+    truncation: Option<&[[f64; 2]]>,
     config: &IdentifyConfig,
 ) -> Option<FittedEfficiencies> {
     let problem = &t2_alone(problem, config)?;
@@ -392,14 +412,19 @@ pub(crate) fn as_measured(
     let ln_h = |i: &usize| {
         problem.model.at_end(&steps[*i].end, &problem.shared, &problem.members[*i].local).h_w_m2k.ln()
     };
-    let fitted = |quantities: &[Quantity], value: &dyn Fn(&usize) -> f64| {
-        let (without, by_reading) = without_readings(covariance, quantities, &kept, steps);
+    let fitted = |quantities: &[Quantity], which: usize, value: &dyn Fn(&usize) -> f64| {
+        let (mut without, by_reading) = without_readings(covariance, quantities, &kept, steps);
+        if let Some(changes) = truncation {
+            let changes = DVector::from_iterator(kept.len(), kept.iter().map(|i| changes[*i][which]));
+            without += &changes * changes.transpose();
+        }
         FittedQuantity { values: kept.iter().map(value).collect(), covariance: without, by_reading }
     };
     Some(FittedEfficiencies {
         positions: kept.iter().map(|i| steps[*i].position).collect(),
-        eta: fitted(&etas, &|i| etas[*i].value),
-        ln_h: fitted(&ln_hs, &ln_h),
+        eta: fitted(&etas, 0, &|i| etas[*i].value),
+        ln_h: fitted(&ln_hs, 1, &ln_h),
+        has_one_wall: matches!(problem.model.parts, Parts::One | Parts::InnerWall),
     })
 }
 

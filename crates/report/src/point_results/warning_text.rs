@@ -144,7 +144,7 @@ fn model_doubt(doubt: &ModelDoubt) -> Sentence {
             sentence!("the points scatter by {} % about the convection law", number(100.0 * scatter_ratio, 1))
         }
         ModelEvidence::Housing { residual_ratio, heat_w } => sentence!(
-            "the housing is not one or two masses: the slow part of Tc's residual is {} times that of the declared noise, and the heat \
+            "the housing is not one, two or three masses: the slow part of Tc's residual is {} times that of the declared noise, and the heat \
              balances of the steps are off by {} W",
             number(*residual_ratio, 2),
             number(*heat_w, 1)

@@ -20,6 +20,8 @@ pub(crate) struct FittedEfficiencies {
     pub(crate) eta: FittedQuantity,
     /// ln of h, W/(m2 K).
     pub(crate) ln_h: FittedQuantity,
+    /// Whether the gas touches a wall of one temperature.
+    pub(crate) has_one_wall: bool,
 }
 
 /// One quantity of all steps.

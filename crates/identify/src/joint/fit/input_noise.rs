@@ -2,13 +2,14 @@
 
 use crate::joint::step_model::parameters::{
     ALPHA, EXPONENT, LN_CAPACITY, LN_COEFFICIENT, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE,
-    LOGIT_INNER, PREHEAT, PROBE_MM2, Place, SHARED, SharedVector, TC_GAIN, TC_LAG,
+    LN_THIRD_CONDUCTANCE, LOGIT_AREA, LOGIT_INNER, LOGIT_THIRD, LOGIT_THIRD_AREA, PREHEAT, PROBE_MM2, Place,
+    SHARED, SharedVector, TC_GAIN, TC_LAG,
 };
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
 /// Parameters on which the effect of input noise depends, with the step of the derivative. Bound: small against the change of the effect.
-pub(crate) const BY_INPUT_NOISE: [(Place, f64); 11] = [
+pub(crate) const BY_INPUT_NOISE: [(Place, f64); 15] = [
     (LN_COEFFICIENT, 1e-3),
     (EXPONENT, 1e-3),
     (ALPHA, 1e-3),
@@ -20,6 +21,10 @@ pub(crate) const BY_INPUT_NOISE: [(Place, f64); 11] = [
     (LN_CAPACITY, 1e-3),
     (LOGIT_INNER, 1e-2),
     (LN_INNER_CONDUCTANCE, 1e-2),
+    (LOGIT_AREA, 1e-2),
+    (LOGIT_THIRD, 1e-2),
+    (LN_THIRD_CONDUCTANCE, 1e-2),
+    (LOGIT_THIRD_AREA, 1e-2),
 ];
 
 /// The expected sum of squares of input noise, about the shared parameters at which it was found: `slope d + d^T square d`.

@@ -2,11 +2,12 @@
 //! and the shared ones, so they are eliminated step by step.
 
 use crate::joint::fit::input_noise::{InputNoise, Whitening};
-use crate::joint::step_model::history::{Prediction, Wall};
+use crate::joint::step_model::history::{PartsAtEnd, Prediction};
 use crate::joint::step_model::linearised::{Model, StepHistory};
 use crate::joint::step_model::parameters::{
     ETA, HOUSING, LOCAL, LocalVector, OFFSETS, Prior, SHARED, SharedVector, bounds, longest_move,
 };
+use crate::joint::step_model::parts::Parts;
 use mapper_core::IdentifiedInlet;
 use mapper_numerics::least_squares::{Arrow, ArrowBlock, DampedFit, ENOUGH, Reduced, inverse, minimise};
 use mapper_numerics::parallel;
@@ -227,8 +228,8 @@ impl Problem<'_> {
         self.members.iter().map(|member| member.local).collect()
     }
 
-    /// The predictions of all steps, with derivatives by the parameters of the steps and the shared ones named in `by`. With an inner wall,
-    /// step after step: each begins with the wall of the one before.
+    /// The predictions of all steps, with derivatives by the parameters of the steps and the shared ones named in `by`. With several parts of the
+    /// housing, step after step: each begins with the parts of the one before.
     pub(crate) fn predictions(
         &self,
         shared: &SharedVector,
@@ -236,25 +237,25 @@ impl Problem<'_> {
         by: Option<&[bool; SHARED]>,
     ) -> Vec<Prediction> {
         let none = [false; SHARED];
-        let predict = |member: &Member<'_>, local: &LocalVector, before: Option<&Wall>| {
+        let predict = |member: &Member<'_>, local: &LocalVector, before: Option<&PartsAtEnd>| {
             self.model.predict(&member.history, (shared, local), by.unwrap_or(&none), by.is_some(), before)
         };
         let members: Vec<_> = self.members.iter().zip(locals).collect();
-        if !self.model.has_inner_wall {
+        if self.model.parts == Parts::One {
             return parallel::map(&members, |(member, local)| predict(member, local, None));
         }
         let mut predictions: Vec<Prediction> = Vec::with_capacity(members.len());
         for (member, local) in members {
-            let before = predictions.last().and_then(|prediction| prediction.wall.as_ref());
+            let before = predictions.last().and_then(|prediction| prediction.parts.as_ref());
             let prediction = predict(member, local, before);
             predictions.push(prediction);
         }
         predictions
     }
 
-    /// The inner wall at the begin of each step.
-    pub(crate) fn walls(&self, predictions: &[Prediction]) -> Vec<Option<Wall>> {
-        let ends = predictions.iter().map(|prediction| prediction.wall.clone());
+    /// The other parts of the housing at the begin of each step.
+    pub(crate) fn parts(&self, predictions: &[Prediction]) -> Vec<Option<PartsAtEnd>> {
+        let ends = predictions.iter().map(|prediction| prediction.parts.clone());
         std::iter::once(None).chain(ends).take(self.members.len()).collect()
     }
 

@@ -9,10 +9,12 @@ use crate::joint::step_model::linearised::{Model, StepHistory};
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, BEARING, ETA, EXPONENT, EXTERNAL, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HEAT,
     HEAT_BY_TC, HUMIDITY, INLET, LN_AREA, LN_CAPACITY, LN_COEFFICIENT, LN_DEVIATION,
-    LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LN_OIL, LOCAL, LOGIT_INNER, OFFSET_CHANNELS, OFFSETS,
-    PREHEAT, PROBE_MM2, Prior, RADIATION, REFINEMENTS, SHARED, STEP_HEAT, SURFACE, SurfaceScale, TC_LAG,
-    TERM_COUNT, THERMOMETERS,
+    LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LN_OIL, LN_THIRD_CONDUCTANCE, LOCAL, LOGIT_AREA,
+    LOGIT_BEARING, LOGIT_INNER, LOGIT_THIRD, LOGIT_THIRD_AREA, OFFSET_CHANNELS, OFFSETS, PREHEAT, PROBE_MM2,
+    Place, Prior, RADIATION, REFINEMENTS, SHARED, STEP_HEAT, SURFACE, SurfaceScale, TC_LAG, TERM_COUNT,
+    THERMOMETERS,
 };
+use crate::joint::step_model::parts::Parts;
 use crate::joint::step_model::rows::{StepRows, condensed};
 use crate::single_step::dynamic::{self, Estimate};
 use crate::step_data::end_state::EndState;
@@ -88,10 +90,19 @@ const NEIGHBOURS_SIGMA_W: f64 = 100.0;
 const HEAT_BY_TC_SIGMA_W_K: f64 = 2.0;
 /// Prior of the heat that a step's balance does not have, W: its spread is fitted. Bound: a hundredth of what a hot housing exchanges.
 pub(crate) const STEP_HEAT_SIGMA_W: f64 = 3.0;
-/// Prior of the logit of the inner wall's share of the capacity. Bound: shares of 0.05 to 0.85 within two standard deviations.
-const LOGIT_INNER_PRIOR: (f64, f64) = (-0.5, 1.2);
-/// Prior of ln of the inner wall's conductance, W/K. Bound: 2 to 280 W/K within two standard deviations.
-const LN_INNER_CONDUCTANCE_PRIOR: (f64, f64) = (3.2, 1.2);
+/// Priors of the housing's division: mean and standard deviation of logits of shares, and of ln of conductances in W/K. Bound: shares of 0.05 to
+/// 0.85 within two standard deviations; conductances of 2 to 280 W/K, 1 to 110 W/K to a third part, which is farther away.
+const DIVISION_PRIORS: [(Place, (f64, f64)); 7] = [
+    (LOGIT_INNER, (-0.5, 1.2)),
+    (LN_INNER_CONDUCTANCE, (3.2, 1.2)),
+    (LOGIT_AREA, (-0.5, 1.2)),
+    (LOGIT_BEARING, (0.0, 1.2)),
+    (LOGIT_THIRD, (-1.0, 1.2)),
+    (LN_THIRD_CONDUCTANCE, (2.3, 1.2)),
+    (LOGIT_THIRD_AREA, (-0.5, 1.2)),
+];
+/// Start values of a third part. Bound: start values only; a small one, so that the other parts begin where they were.
+const THIRD_START: [(Place, f64); 2] = [(LOGIT_THIRD, -1.5), (LOGIT_THIRD_AREA, -2.0)];
 
 /// Expected spread of the points' efficiencies about the surface, fraction: maps are not polynomials. Calibrated:
 /// `benches/identification.py`, 0.0006; a machine with a map that drops steeply at choke has 0.005.
@@ -287,7 +298,7 @@ pub(crate) fn problem<'a>(
             fit(HEAT, NEIGHBOURS_W, NEIGHBOURS_SIGMA_W);
         }
     }
-    let model = Model { setting, housing: config.housing, has_inner_wall: false, has_balance };
+    let model = Model { setting, housing: config.housing, parts: Parts::One, has_balance };
     let etas: Vec<f64> = steps
         .iter()
         .filter_map(|step| alone.get(step.position)?.eta.map(|(eta, _)| eta))
@@ -318,18 +329,19 @@ pub(crate) fn problem<'a>(
     })
 }
 
-/// The problem of a housing with an inner wall, which the problem of one node starts.
-pub(crate) fn with_inner_wall<'a>(problem: &Problem<'a>) -> Problem<'a> {
-    let mut two = problem.clone();
-    two.model.has_inner_wall = true;
-    for (index, (mean, sigma)) in
-        [(LOGIT_INNER, LOGIT_INNER_PRIOR), (LN_INNER_CONDUCTANCE, LN_INNER_CONDUCTANCE_PRIOR)]
-    {
-        two.priors[index] = Prior { mean, sigma };
-        two.shared[index] = mean;
-        two.active[index] = true;
+/// The problem of a housing of more parts, which the problem of fewer starts.
+pub(crate) fn with_parts<'a>(problem: &Problem<'a>, parts: Parts) -> Problem<'a> {
+    let mut more = problem.clone();
+    more.model.parts = parts;
+    for (index, (mean, sigma)) in DIVISION_PRIORS {
+        if parts.parameters().contains(&index) && !more.active[index] {
+            more.priors[index] = Prior { mean, sigma };
+            more.shared[index] =
+                THIRD_START.into_iter().find(|(place, _)| *place == index).map_or(mean, |at| at.1);
+            more.active[index] = true;
+        }
     }
-    two
+    more
 }
 
 /// A step with its start values. `found`: result of the step alone; `mean_eta` replaces an efficiency that it does not give.

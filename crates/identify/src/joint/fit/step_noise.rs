@@ -9,7 +9,7 @@ use crate::joint::fit::input_noise::{BY_INPUT_NOISE, InputNoise, Whitening};
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::step_model::gas_path::Wanted;
 use crate::joint::step_model::linearised::{Linearised, SmoothedInput, StepHistory};
-use crate::joint::step_model::parameters::{ETA, LOCAL, SHARED, SharedVector};
+use crate::joint::step_model::parameters::{ETA, LOCAL, SHARED, SharedVector, TC_LAG};
 use crate::joint::step_model::rows::{Basis, FLOW, P1, P2, SMOOTHED_COUNT, Smoothing, StepRows, T1, TC};
 use mapper_core::Channel;
 use mapper_numerics::parallel;
@@ -28,6 +28,13 @@ const FITTED_PER_STEP: f64 = 3.0;
 /// Minimum noise of a block mean without declared noise, K. Bound: rounding of readings to 0.001 K.
 const MIN_NOISE_K: f64 = 3e-4;
 
+/// Error of the slope of Tc that smoothing leaves, ratio to its root mean square in the window. A lag times it is the temperature that the
+/// thermocouple has not reached: without this error the covariance is nearly singular, because a decay with the lag itself moves no
+/// reading. Bound: functions of 3 and 8 s follow a decay of 2 to 5 s within a hundredth.
+const SMOOTHED_SLOPE_RATIO: f64 = 0.01;
+/// Time over which that error keeps its sign, s. Bound: between the two functions' times.
+const SMOOTHED_SLOPE_S: f64 = 5.0;
+
 /// The smoothed channels in the order of their places, with the channel of their noise.
 const INPUTS: [(usize, SmoothedInput, Channel); SMOOTHED_COUNT] = [
     (T1, SmoothedInput::T1, Channel::T1),
@@ -45,7 +52,7 @@ const INPUTS: [(usize, SmoothedInput, Channel); SMOOTHED_COUNT] = [
 /// least squares, e.g. Carroll et al., Measurement Error in Nonlinear Models, ch. 7), as far as the parameters of the steps do not explain it.
 pub(crate) fn set(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
     let predictions = problem.predictions(&problem.shared, &problem.locals(), None);
-    let walls = problem.walls(&predictions);
+    let parts = problem.parts(&predictions);
     let problem_now = &*problem;
     let places: Vec<usize> = (0..problem_now.members.len()).collect();
     let found = parallel::map(&places, |i| {
@@ -55,7 +62,7 @@ pub(crate) fn set(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<
         let linearised = |shared: &SharedVector, wanted: Wanted, known: Option<&Linearised<'_>>| {
             let (history, at) = (&member.history, (shared, &member.local));
             let paths = (known.is_none(), known);
-            problem_now.model.linearised(history, at, Some(wanted), walls[*i].as_ref(), paths).0
+            problem_now.model.linearised(history, at, Some(wanted), parts[*i].as_ref(), paths).0
         };
         let here = linearised(&problem_now.shared, Wanted::Law, None);
         let (covariance, inputs) = covariance(problem_now, member, &here, &residual, config);
@@ -295,7 +302,15 @@ fn covariance<'a>(
     let shape = DVector::from_vec(linearised.by_surface(&member.history, &problem.shared));
     sum += SLOPE_SIGMA * SLOPE_SIGMA * &shape * shape.transpose();
     if rows > count {
-        sum.view_mut((count, count), (count, count)).add_scalar_mut(UNKNOWN_START_K.powi(2));
+        let mut tc = sum.view_mut((count, count), (count, count));
+        tc.add_scalar_mut(UNKNOWN_START_K.powi(2));
+        let slope_k_s = rms(step.rows.iter().map(|row| row.tc_slope_k_s)).unwrap_or(0.0);
+        let left_k = SMOOTHED_SLOPE_RATIO * slope_k_s * problem.shared[TC_LAG];
+        for (i, a) in step.rows.iter().enumerate() {
+            for (j, b) in step.rows.iter().enumerate() {
+                tc[(i, j)] += left_k * left_k * (-(a.t_s - b.t_s).abs() / SMOOTHED_SLOPE_S).exp();
+            }
+        }
     }
     floor(&mut sum);
     (sum, parts)

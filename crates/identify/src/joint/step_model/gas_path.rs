@@ -103,8 +103,8 @@ struct InletGas {
     cp_j_kgk: f64,
 }
 
-/// Derivatives of T2, heat to the wall and heat of the inlet by each input.
-pub(crate) type Slopes = [[f64; 3]; INPUT_COUNT];
+/// Derivatives of T2, heat to the wall, heat of the inlet and conductance between gas and wall by each input.
+pub(crate) type Slopes = [[f64; 4]; INPUT_COUNT];
 
 /// Which derivatives are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -266,13 +266,13 @@ impl Setting {
         law.h_ratio(inputs.t1_k, path.bulk_k).ln()
     }
 
-    /// Heat from the gas to its wall, W, and the conductance between them, W/K.
-    pub(crate) fn wall_heat(&self, inputs: &Inputs, shared: &SharedVector) -> (f64, f64) {
+    /// Heat from the gas to its wall, W, what it falls by per kelvin of the wall, and the conductance between them, W/K.
+    pub(crate) fn wall_heat(&self, inputs: &Inputs, shared: &SharedVector) -> (f64, f64, f64) {
         let here = self.gas_path(inputs, shared);
         let step_k = SLOPE_STEP * inputs.wall_k;
         let hotter = Inputs { wall_k: inputs.wall_k + step_k, ..*inputs };
         let hotter_w = self.gas_path_near(Some((inputs, &here)), &hotter, shared).wall_w;
-        (here.wall_w, (here.wall_w - hotter_w) / step_k)
+        (here.wall_w, (here.wall_w - hotter_w) / step_k, here.h_w_m2k * self.internal_area_m2)
     }
 
     /// The derivatives, by difference quotients, those that are not wanted 0. `known`: paths found before.
@@ -289,19 +289,20 @@ impl Setting {
                 (there.t2_k - here.t2_k) / step,
                 (there.wall_w - here.wall_w) / step,
                 (there.duct_w - here.duct_w) / step,
+                (there.h_w_m2k - here.h_w_m2k) * self.internal_area_m2 / step,
             ]
         };
         let by = |moved: Inputs, step: f64| {
             quotient(&self.gas_path_near(Some((inputs, here)), &moved, shared), step)
         };
         let by_law =
-            |moved: Inputs, step: f64| if wanted >= Wanted::Law { by(moved, step) } else { [0.0; 3] };
+            |moved: Inputs, step: f64| if wanted >= Wanted::Law { by(moved, step) } else { [0.0; 4] };
         let by_model =
-            |moved: Inputs, step: f64| if wanted >= Wanted::Model { by(moved, step) } else { [0.0; 3] };
+            |moved: Inputs, step: f64| if wanted >= Wanted::Model { by(moved, step) } else { [0.0; 4] };
         let x = *inputs;
         let kelvin = SLOPE_STEP * x.t1_k;
         let flow = SLOPE_STEP * x.flow_kg_s;
-        let none = [0.0; 3];
+        let none = [0.0; 4];
         let hotter = |x: &Inputs| Inputs { t1_k: x.t1_k + kelvin, ..*x };
         let higher = |x: &Inputs| Inputs { p2_pa: x.p2_pa * SLOPE_STEP.exp(), ..*x };
         let better = |x: &Inputs| Inputs { eta: x.eta + SLOPE_STEP, ..*x };
@@ -350,6 +351,8 @@ const MIDDLE_TC_K: f64 = 330.0;
 const TC_STEP_K: f64 = 1e-2;
 /// Parameters of the heat.
 pub(crate) const HEAT_PARAMETERS: [usize; 6] = [EXTERNAL, BEARING, LN_OIL, RADIATION, HEAT, HEAT_BY_TC];
+/// Derivatives of both heats by [`HEAT_PARAMETERS`] and, last, by Tc.
+pub(crate) type HeatSlopes = [[f64; 2]; HEAT_PARAMETERS.len() + 1];
 /// Steps of the derivatives by them, in their units. Bound: the heat is linear in all but the conductance to the oil.
 const STEPS: [f64; 6] = [1e-4, 1e-4, 1e-4, 1e-5, 1e-2, 1e-4];
 
@@ -364,9 +367,9 @@ impl Housing {
         (self.capacity_j_k(tc_k + TC_STEP_K) / self.capacity_j_k(tc_k)).ln() / TC_STEP_K
     }
 
-    /// Heat to the housing at `tc_k`, W. A row without temperature of the turbine housing or of the oil has no conduction to the bearing and no
+    /// Heat to the housing at `tc_k`, W: from bearing and turbine, and the rest. A row without temperature of the turbine housing or of the oil has no conduction to the bearing and no
     /// radiation.
-    pub(crate) fn heat_w(&self, row: &Row, tc_k: f64, shared: &SharedVector) -> f64 {
+    pub(crate) fn heats_w(&self, row: &Row, tc_k: f64, shared: &SharedVector) -> [f64; 2] {
         let ambient_k = if row.ambient_k.is_finite() { row.ambient_k } else { row.t1_k };
         let lost_w = external_heat_w(
             self.external_area_m2,
@@ -377,25 +380,27 @@ impl Housing {
         );
         let other_w = shared[HEAT] + shared[HEAT_BY_TC] * (tc_k - MIDDLE_TC_K);
         if !row.has_neighbours() {
-            return other_w - lost_w;
+            return [0.0, other_w - lost_w];
         }
         let conductance_w_k = bearing_conductance_w_k(&self.bearing) * (1.0 + shared[BEARING]);
         let oil_w_k = self.bearing.oil_conductance_w_k * shared[LN_OIL].exp();
         let friction_w = friction_heat_w(&self.bearing, rad_s_of_rpm(row.speed_rpm));
         let node_k = bearing_k(conductance_w_k, oil_w_k, friction_w, tc_k, row.tt_k, row.oil_k);
-        conductance_w_k * (node_k - tc_k) + radiation_w(shared[RADIATION], row.tt_k, tc_k) + other_w - lost_w
+        let turbine_w = radiation_w(shared[RADIATION], row.tt_k, tc_k);
+        [conductance_w_k * (node_k - tc_k) + turbine_w, other_w - lost_w]
     }
 
-    /// Derivatives of that heat by [`HEAT_PARAMETERS`] and, last, by Tc.
-    pub(crate) fn heat_slopes(&self, row: &Row, tc_k: f64, shared: &SharedVector) -> [f64; 7] {
-        let here = self.heat_w(row, tc_k, shared);
+    /// Derivatives of these heats.
+    pub(crate) fn heat_slopes(&self, row: &Row, tc_k: f64, shared: &SharedVector) -> HeatSlopes {
+        let here = self.heats_w(row, tc_k, shared);
+        let quotient = |there: [f64; 2], step: f64| [0, 1].map(|k| (there[k] - here[k]) / step);
         std::array::from_fn(|place| match HEAT_PARAMETERS.get(place) {
             Some(index) => {
                 let mut moved = *shared;
                 moved[*index] += STEPS[place];
-                (self.heat_w(row, tc_k, &moved) - here) / STEPS[place]
+                quotient(self.heats_w(row, tc_k, &moved), STEPS[place])
             }
-            None => (self.heat_w(row, tc_k + TC_STEP_K, shared) - here) / TC_STEP_K,
+            None => quotient(self.heats_w(row, tc_k + TC_STEP_K, shared), TC_STEP_K),
         })
     }
 }

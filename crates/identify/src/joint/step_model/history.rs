@@ -1,39 +1,29 @@
 //! Predicts the readings of T2 and Tc along a step for given parameters, with their derivatives.
 //!
 //! T2 follows from eqs. 1-3 and the probe. Tc is its own change: the heat to the housing, integrated over the window and divided by the heat
-//! capacity. A housing of one node touches the gas with Tc. One of two nodes touches it with an inner wall of temperature Ti:
-//!
-//! ```text
-//! phi C dTi/dt = q1 + q2 - G (Ti - Tc)      (1 - phi) C dTc/dt = G (Ti - Tc) + q_inlet + Q + w
-//! ```
-//!
-//! Ti is integrated through the whole run, jumps included, with the measured Tc: it remembers the point before, and neither warms up nor cools down
-//! when the run begins. Each parameter acts on a row by a few inputs of the gas path and of the housing; the chain rule gives its column, through
-//! wall, probe and integral.
+//! capacity, for the part with the thermocouple: `phi_c C dTc/dt = its share of q1 + q2 + sum of G_p (T_p - Tc) + q_inlet + Q + w`, with the
+//! temperatures of the other parts by [`parts`](crate::joint::step_model::parts). Each parameter acts on a row by a few inputs of the gas
+//! path and of the housing; the chain rule gives its column, through parts, probe and integral.
 
 use crate::joint::step_model::gas_path::{Inputs, Slopes, Wanted};
 use crate::joint::step_model::linearised::{
-    Linearised, Model, RowState, StepHistory, WallRow, surface_of, tc_error_k,
+    Linearised, Model, RowState, StepHistory, surface_of, tc_error_k,
 };
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, ETA, FIRST_READING, FLOW_GAIN, GAINS, HUMIDITY, INLET, LN_CAPACITY, LN_DEVIATION,
-    LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOCAL, LOGIT_INNER, LocalVector, OFFSETS, PREHEAT,
-    PROBE_MM2, SHARED, STEP_HEAT, SharedVector, TC_LAG, TERM_COUNT, THERMOMETERS, dot,
+    LN_HEATING_COOLING_RATIO, LOCAL, LocalVector, OFFSETS, PREHEAT, PROBE_MM2, SHARED, STEP_HEAT,
+    SharedVector, TC_LAG, TERM_COUNT, THERMOMETERS, dot,
 };
+use crate::joint::step_model::parts::{Around, Division, OTHERS, Parts};
 use crate::joint::step_model::rows::{MAX_ROW_GAP_S, Row};
 use mapper_physics::rig::sensor_fault::ExactReadings;
 
-/// Exponent below which the mean over a row replaces the formula. Bound: the next term is below rounding.
-const SERIES_BELOW: f64 = 1e-6;
-/// Iterations to the temperature of a settled wall. Bound: each reduces its distance, some 10 K, at least tenfold.
-const SETTLED_ROUNDS: usize = 3;
-
-/// Inner wall at the end of a step, and its derivatives by the shared parameters.
+/// The other parts of the housing at the end of a step, and their derivatives by the shared parameters.
 #[derive(Debug, Clone)]
-pub(crate) struct Wall {
+pub(crate) struct PartsAtEnd {
     t_s: f64,
-    wall_k: f64,
-    by_shared: Box<SharedVector>,
+    parts_k: [f64; OTHERS],
+    by_shared: Box<[[f64; OTHERS]; SHARED]>,
 }
 
 /// Predicted readings, first T2, then Tc if the balance is an observation, with one column per parameter: shared ones first, then those of the
@@ -42,7 +32,7 @@ pub(crate) struct Wall {
 pub(crate) struct Prediction {
     pub(crate) readings_k: Vec<f64>,
     pub(crate) columns: Vec<Vec<f64>>,
-    pub(crate) wall: Option<Wall>,
+    pub(crate) parts: Option<PartsAtEnd>,
 }
 
 /// Convection at the end of a step.
@@ -56,11 +46,6 @@ pub(crate) struct StepEnd {
     pub(crate) ln_inlet_ratio: f64,
 }
 
-/// Share of the heat capacity in the inner wall, and its conductance, W/K.
-pub(crate) fn inner_wall(shared: &SharedVector) -> (f64, f64) {
-    (1.0 / (1.0 + (-shared[LOGIT_INNER]).exp()), shared[LN_INNER_CONDUCTANCE].exp())
-}
-
 /// Tc without its errors, K.
 fn outer_k(row: &Row, shared: &SharedVector, exact_at: ExactReadings) -> f64 {
     row.tc_k + shared[TC_LAG] * row.tc_slope_k_s - tc_error_k(row.tc_k, shared, exact_at)
@@ -69,11 +54,6 @@ fn outer_k(row: &Row, shared: &SharedVector, exact_at: ExactReadings) -> f64 {
 /// Error of T2 at the temperature of its probe's tip, K. At the reading, the noise would be part of the prediction, and a gain would be fitted to it.
 fn t2_error_k(probe_k: f64, shared: &SharedVector, exact_at: ExactReadings) -> f64 {
     shared[OFFSETS + 1] + shared[THERMOMETERS] + shared[GAINS] * (probe_k - exact_at.temperature_k)
-}
-
-/// Mean of `exp(-x s)` over s from 0 to 1.
-fn mean_decay(x: f64) -> f64 {
-    if x.abs() < SERIES_BELOW { 1.0 - 0.5 * x } else { -(-x).exp_m1() / x }
 }
 
 impl Model {
@@ -116,16 +96,16 @@ impl Model {
     }
 
     /// Predicts the readings, with derivatives by the parameters in `active` and by those of the step if `derivatives` is set. `before`: the
-    /// inner wall at the end of the step before.
+    /// other parts of the housing at the end of the step before.
     pub(crate) fn predict(
         &self,
         history: &StepHistory<'_>,
         (shared, local): (&SharedVector, &LocalVector),
         active: &[bool; SHARED],
         derivatives: bool,
-        before: Option<&Wall>,
+        before: Option<&PartsAtEnd>,
     ) -> Prediction {
-        let (linearised, start, end_k) = {
+        let (linearised, start, parts_k) = {
             let wanted = if active[INLET] || active[HUMIDITY] { Wanted::Model } else { Wanted::Law };
             self.linearised(history, (shared, local), derivatives.then_some(wanted), before, (false, None))
         };
@@ -135,13 +115,13 @@ impl Model {
         if self.has_balance {
             readings_k.extend(linearised.tc_k(shared));
         }
-        let mut prediction = Prediction { readings_k, columns: Vec::new(), wall: None };
+        let mut prediction = Prediction { readings_k, columns: Vec::new(), parts: None };
         let last_s = history.step.rows.last().map_or(f64::NAN, |row| row.t_s);
-        let mut by_shared = Box::new([0.0; SHARED]);
+        let mut by_shared = Box::new([[0.0; OTHERS]; SHARED]);
         if derivatives {
             prediction.columns = vec![Vec::new(); SHARED + LOCAL];
             for index in (0..SHARED).filter(|index| active[*index]) {
-                let start_by = start.as_ref().map(|wall| wall.by_shared[index]);
+                let start_by = start.as_ref().map(|parts| parts.by_shared[index]);
                 let (column, end_by) = linearised.by_shared(index, history, shared, local, start_by);
                 prediction.columns[index] = column;
                 by_shared[index] = end_by;
@@ -150,45 +130,42 @@ impl Model {
                 prediction.columns[SHARED + index] = linearised.by_local(index);
             }
         }
-        prediction.wall = self.has_inner_wall.then_some(Wall { t_s: last_s, wall_k: end_k, by_shared });
+        prediction.parts =
+            (self.parts != Parts::One).then_some(PartsAtEnd { t_s: last_s, parts_k, by_shared });
         prediction
     }
 
-    /// The states along a step, the wall it starts from, and the wall at its end, K. `derivatives`: see [`Setting::slopes`]. `known`: the same
-    /// step with other parameters of the law, with the paths that it keeps.
+    /// The states along a step, the other parts of the housing it starts from, and those at its end, K. `derivatives`: see
+    /// [`Setting::slopes`]. `known`: the same step with other parameters of the law, with the paths that it keeps.
     pub(crate) fn linearised<'a>(
         &'a self,
         history: &StepHistory<'a>,
         (shared, local): (&SharedVector, &LocalVector),
         derivatives: Option<Wanted>,
-        before: Option<&Wall>,
+        before: Option<&PartsAtEnd>,
         (keeps, known): (bool, Option<&Linearised<'_>>),
-    ) -> (Linearised<'a>, Option<Wall>, f64) {
+    ) -> (Linearised<'a>, Option<PartsAtEnd>, [f64; OTHERS]) {
         let step = history.step;
-        let skipped = if self.has_inner_wall { 0 } else { step.lead.len() };
+        let has_parts = self.parts != Parts::One;
+        let skipped = if has_parts { 0 } else { step.lead.len() };
         let rows: Vec<&Row> = step.lead.iter().chain(&step.rows).skip(skipped).collect();
-        let inner = inner_wall(shared);
-        let start = before.filter(|wall| rows.first().is_some_and(|row| row.t_s - wall.t_s < MAX_ROW_GAP_S));
-        let first_terms = history.terms.get(skipped).unwrap_or(&[0.0; TERM_COUNT]);
-        let settled_k = |row: &&Row| {
-            let inputs = self.inputs(row, first_terms, shared, local);
-            if self.has_inner_wall { self.settled_wall_k(inputs, inner, shared) } else { inputs.outer_k }
-        };
-        let mut wall_k = start.map_or_else(|| rows.first().map_or(f64::NAN, settled_k), |wall| wall.wall_k);
+        let division = Division::of(self.parts, shared);
+        let start =
+            before.filter(|parts| rows.first().is_some_and(|row| row.t_s - parts.t_s < MAX_ROW_GAP_S));
+        let mut parts_k = start.map(|parts| parts.parts_k);
         let mut states = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
             let terms = history.terms.get(skipped + i).unwrap_or(&[0.0; TERM_COUNT]);
             let mut inputs = self.inputs(row, terms, shared, local);
-            let capacity_j_k = self.housing.capacity_j_k(inputs.outer_k) * shared[LN_CAPACITY].exp();
-            let mut along = WallRow::default();
-            if self.has_inner_wall {
-                let width_s = row_width_s(&rows, i);
-                let (next_k, mean_k, found) =
-                    self.wall_along(inputs, wall_k, (inner, capacity_j_k, width_s), shared);
-                inputs.wall_k = mean_k;
-                along = found;
-                wall_k = next_k;
-            }
+            let outer_k = inputs.outer_k;
+            let capacity_j_k = self.housing.capacity_j_k(outer_k) * shared[LN_CAPACITY].exp();
+            let heats_w = self.housing.heats_w(row, outer_k, shared);
+            let around =
+                Around { setting: &self.setting, shared, division: &division, inputs, bearing_w: heats_w[0] };
+            let start_k = parts_k.unwrap_or_else(|| around.settled_k());
+            let (end_k, parts) = around.along(start_k, capacity_j_k, row_width_s(&rows, i));
+            parts_k = Some(end_k);
+            inputs.wall_k = division.wall_k(outer_k, &parts.mean_k);
             let known = known.and_then(|known| known.states.get(i));
             let near = known.map(|state| (&state.inputs, &state.path));
             let path = self.setting.gas_path_near(near, &inputs, shared);
@@ -200,67 +177,41 @@ impl Model {
                 }
                 None => (Slopes::default(), None),
             };
-            let heat_w = self.housing.heat_w(row, inputs.outer_k, shared) + local[STEP_HEAT] + path.duct_w;
             let heat = if derivatives.is_some() {
-                self.housing.heat_slopes(row, inputs.outer_k, shared)
+                self.housing.heat_slopes(row, outer_k, shared)
             } else {
                 Default::default()
             };
-            let (outer_j_k, gas_w) = if self.has_inner_wall {
-                ((1.0 - inner.0) * capacity_j_k, inner.1 * (inputs.wall_k - inputs.outer_k))
-            } else {
-                (capacity_j_k, path.wall_w)
-            };
-            let rate_k_s = (gas_w + heat_w) / outer_j_k;
-            let ln_capacity_by_k = self.housing.ln_capacity_by_k(inputs.outer_k);
+            let contact_w_k = path.h_w_m2k * self.setting.internal_area_m2;
+            let mut outer_w = division.area[0] * (path.wall_w + contact_w_k * (inputs.wall_k - outer_k))
+                + heats_w[0]
+                + heats_w[1]
+                + local[STEP_HEAT]
+                + path.duct_w;
+            for part in 0..division.others {
+                outer_w += division.conductance_w_k[part] * (parts.mean_k[part] - outer_k)
+                    - division.bearing[part] * heats_w[0];
+            }
+            let outer_j_k = division.capacity[0] * capacity_j_k;
             states.push(RowState {
                 path,
                 slopes,
                 compressed,
                 inputs,
-                rate_k_s,
+                rate_k_s: outer_w / outer_j_k,
                 outer_j_k,
-                ln_capacity_by_k,
+                ln_capacity_by_k: self.housing.ln_capacity_by_k(outer_k),
+                bearing_w: heats_w[0],
                 heat,
-                wall: along,
+                contact_w_k,
+                parts,
             });
         }
         let lead = step.lead.len() - skipped.min(step.lead.len());
         let gas_k: Vec<f64> = states[lead..].iter().map(|state| state.path.t2_k).collect();
         let probe = self.probe(&step.rows, &gas_k, shared[PROBE_MM2]);
-        let linearised = Linearised { model: self, step, states, lead, inner, probe, gas_k };
-        (linearised, start.cloned(), wall_k)
-    }
-
-    /// The inner wall that neither warms up nor cools down, K: what a run begins with.
-    fn settled_wall_k(&self, inputs: Inputs, (_, conductance_w_k): (f64, f64), shared: &SharedVector) -> f64 {
-        let mut wall_k = inputs.outer_k;
-        for _ in 0..SETTLED_ROUNDS {
-            let inputs = Inputs { wall_k, ..inputs };
-            let (wall_w, gas_w_k) = self.setting.wall_heat(&inputs, shared);
-            wall_k += (wall_w - conductance_w_k * (wall_k - inputs.outer_k)) / (gas_w_k + conductance_w_k);
-        }
-        wall_k
-    }
-
-    /// The inner wall over a row with constant coefficients: its temperature at the end and its mean, K.
-    fn wall_along(
-        &self,
-        inputs: Inputs,
-        start_k: f64,
-        ((share, conductance_w_k), capacity_j_k, width_s): ((f64, f64), f64, f64),
-        shared: &SharedVector,
-    ) -> (f64, f64, WallRow) {
-        let inputs = Inputs { wall_k: start_k, ..inputs };
-        let (wall_w, gas_w_k) = self.setting.wall_heat(&inputs, shared);
-        let sum_w_k = gas_w_k + conductance_w_k;
-        let inner_j_k = share * capacity_j_k;
-        let settled_k = start_k + (wall_w - conductance_w_k * (start_k - inputs.outer_k)) / sum_w_k;
-        let x = width_s * sum_w_k / inner_j_k;
-        let (kept, mean) = ((-x).exp(), mean_decay(x));
-        let end_k = settled_k + (start_k - settled_k) * kept;
-        let stored_w = if width_s > 0.0 { inner_j_k * (end_k - start_k) / width_s } else { 0.0 };
-        (end_k, settled_k + (start_k - settled_k) * mean, WallRow { kept, mean, sum_w_k, stored_w })
+        let linearised = Linearised { model: self, step, states, lead, division, probe, gas_k };
+        (linearised, start.cloned(), parts_k.unwrap_or_default())
     }
 }
 

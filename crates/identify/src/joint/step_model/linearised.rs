@@ -2,14 +2,15 @@
 
 use crate::config::Housing;
 use crate::joint::step_model::gas_path::{
-    Compressed, GasPath, HEAT_PARAMETERS, Input, Inputs, Setting, Slopes,
+    Compressed, GasPath, HEAT_PARAMETERS, HeatSlopes, Input, Inputs, Setting, Slopes,
 };
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAINS, HUMIDITY, INLET, LN_CAPACITY,
-    LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO, LN_INNER_CONDUCTANCE, LOGIT_INNER, LocalVector,
-    OFFSETS, P1_GAIN, P1_OFFSET, P2_GAIN, P2_OFFSET, PREHEAT, PROBE_MM2, STEP_HEAT, SURFACE, SharedVector,
-    T2_GAIN, T2_OFFSET, TC_GAIN, TC_LAG, TC_OFFSET, TERM_COUNT, THERMOMETERS, dot,
+    LN_COEFFICIENT, LN_DEVIATION, LN_HEATING_COOLING_RATIO, LocalVector, OFFSETS, P1_GAIN, P1_OFFSET,
+    P2_GAIN, P2_OFFSET, PREHEAT, PROBE_MM2, STEP_HEAT, SURFACE, SharedVector, T2_GAIN, T2_OFFSET, TC_GAIN,
+    TC_LAG, TC_OFFSET, TERM_COUNT, THERMOMETERS, dot,
 };
+use crate::joint::step_model::parts::{Division, OTHERS, Parts, PartsRow};
 use crate::joint::step_model::rows::{Row, StepRows};
 use crate::single_step::fit::{self, Lag, follow};
 use mapper_core::unit_factors::M_PER_MM;
@@ -17,6 +18,8 @@ use mapper_physics::rig::sensor_fault::ExactReadings;
 
 /// Step of the derivative by the square of the probe's diameter, relative. Bound: between rounding and curvature.
 const PROBE_STEP_RATIO: f64 = 1e-3;
+/// Iterations to the change of settled parts. Bound: each reduces what is left at least threefold.
+const SETTLED_ROUNDS: usize = 8;
 /// Square of the diameter below which the lag is linear in it, mm2: it grows with a power below 1, which has no slope at 0. Bound: 0.3 mm lag
 /// by a tenth of a second, below anything that a block of half a second shows.
 pub(crate) const LINEAR_BELOW_MM2: f64 = 0.1;
@@ -26,8 +29,8 @@ pub(crate) const LINEAR_BELOW_MM2: f64 = 0.1;
 pub(crate) struct Model {
     pub(crate) setting: Setting,
     pub(crate) housing: Housing,
-    /// Whether the inner wall has its own temperature.
-    pub(crate) has_inner_wall: bool,
+    /// The parts of the housing that have their own temperature.
+    pub(crate) parts: Parts,
     /// Whether the change of Tc is an observation.
     pub(crate) has_balance: bool,
 }
@@ -49,25 +52,16 @@ pub(super) struct RowState {
     pub(super) inputs: Inputs,
     /// Rate of Tc by the heat, K/s.
     pub(super) rate_k_s: f64,
-    /// Heat capacity of the outer part (of the housing, if it is one node), J/K, and the derivative of its logarithm by Tc, 1/K.
+    /// Heat capacity of the outer part, J/K, and the derivative of its logarithm by Tc, 1/K.
     pub(super) outer_j_k: f64,
     pub(super) ln_capacity_by_k: f64,
-    /// Derivatives of the heat from elsewhere: see [`Housing::heat_slopes`].
-    pub(super) heat: [f64; HEAT_PARAMETERS.len() + 1],
-    pub(super) wall: WallRow,
-}
-
-/// The inner wall along a row.
-#[derive(Clone, Copy, Default)]
-pub(super) struct WallRow {
-    /// Share of its deviation that is left at the row's end.
-    pub(super) kept: f64,
-    /// Mean share over the row.
-    pub(super) mean: f64,
-    /// Conductance to gas and outer part, W/K.
-    pub(super) sum_w_k: f64,
-    /// Its mean rate times its capacity, W.
-    pub(super) stored_w: f64,
+    /// Heat from bearing and turbine, W.
+    pub(super) bearing_w: f64,
+    /// Derivatives of the heat from elsewhere.
+    pub(super) heat: HeatSlopes,
+    /// Conductance between gas and wall, W/K.
+    pub(super) contact_w_k: f64,
+    pub(super) parts: PartsRow,
 }
 
 /// Maximum number of inputs that a change moves. Source: [`Change`]'s constructors.
@@ -78,29 +72,31 @@ const MOVED_INPUTS: usize = 2;
 pub(super) struct Change {
     /// Inputs of the gas path and by how much each changes.
     inputs: [(Input, f64); MOVED_INPUTS],
-    /// Heat from elsewhere, W.
-    heat_w: f64,
+    /// Heat from elsewhere, W: from bearing and turbine, and the rest.
+    heats_w: [f64; 2],
     /// Tc without its errors, K; also in `inputs`.
     reading_k: f64,
     ln_capacity: f64,
-    logit_inner: f64,
-    ln_conductance: f64,
+    division: Option<Division>,
 }
 
 impl Default for Change {
     fn default() -> Self {
         Change {
             inputs: [(Input::Eta, 0.0); MOVED_INPUTS],
-            heat_w: 0.0,
+            heats_w: [0.0; 2],
             reading_k: 0.0,
             ln_capacity: 0.0,
-            logit_inner: 0.0,
-            ln_conductance: 0.0,
+            division: None,
         }
     }
 }
 
 impl Change {
+    fn outer_k(&self) -> f64 {
+        self.inputs.iter().filter(|(input, _)| *input == Input::Outer).map(|(_, by)| by).sum()
+    }
+
     fn of(input: Input, by: f64) -> Self {
         Change { inputs: [(input, by), (input, 0.0)], ..Change::default() }
     }
@@ -116,9 +112,18 @@ impl Change {
         Change { reading_k: by, ..Change::of(Input::Outer, by) }
     }
 
-    fn heat(by_w: f64) -> Self {
-        Change { heat_w: by_w, ..Change::default() }
+    fn heats(by_w: [f64; 2]) -> Self {
+        Change { heats_w: by_w, ..Change::default() }
     }
+}
+
+/// A change as it acts in a row.
+struct OwnChange {
+    outer_k: f64,
+    /// Of T2, heat to the wall, heat of the inlet and conductance, with the wall as it is.
+    by: [f64; 4],
+    division: Division,
+    bearing_w: f64,
 }
 
 /// A model linearised along a step.
@@ -128,8 +133,7 @@ pub(crate) struct Linearised<'a> {
     pub(super) states: Vec<RowState>,
     /// Number of states before the window.
     pub(super) lead: usize,
-    /// Capacity share and conductance of the inner wall.
-    pub(super) inner: (f64, f64),
+    pub(super) division: Division,
     pub(super) probe: Probe,
     pub(super) gas_k: Vec<f64>,
 }
@@ -182,51 +186,57 @@ impl Linearised<'_> {
             .collect()
     }
 
-    /// Changes of the readings, and of the inner wall at the end, by a change of each row.
-    fn respond(&self, change: impl Fn(usize, &RowState) -> Change, start_k: Option<f64>) -> (Vec<f64>, f64) {
-        let mut wall_k = start_k;
+    /// Changes of the readings, and of the other parts of the housing at the end, by a change of each row.
+    fn respond(
+        &self,
+        change: impl Fn(usize, &RowState) -> Change,
+        start_k: Option<[f64; OTHERS]>,
+    ) -> (Vec<f64>, [f64; OTHERS]) {
+        let mut parts_k = start_k;
         let window = self.states.len() - self.lead;
         let (mut gas, mut rates, mut readings) =
             (Vec::with_capacity(window), Vec::with_capacity(window), Vec::with_capacity(window));
-        let (share, conductance_w_k) = self.inner;
         for (i, state) in self.states.iter().enumerate() {
-            let Change { inputs, heat_w, reading_k, ln_capacity, logit_inner, ln_conductance } =
-                change(i, state);
-            let outer_k: f64 =
-                inputs.iter().filter(|(input, _)| *input == Input::Outer).map(|(_, by)| by).sum();
+            let change = change(i, state);
             let by = |which: usize| -> f64 {
-                inputs.iter().map(|(input, by)| state.slopes[*input as usize][which] * by).sum()
+                change.inputs.iter().map(|(input, by)| state.slopes[*input as usize][which] * by).sum()
             };
-            let (mut t2_k, mut wall_w, duct_w) = (by(0), by(1), by(2));
-            let mut row_wall_k = outer_k;
-            if self.model.has_inner_wall {
-                let off_k = state.inputs.wall_k - state.inputs.outer_k;
-                let driving_w = wall_w + conductance_w_k * (outer_k - ln_conductance * off_k)
-                    - (ln_capacity + (1.0 - share) * logit_inner) * state.wall.stored_w;
-                let settled_k = driving_w / state.wall.sum_w_k;
-                // Without a step before, the wall is settled.
-                let from_k = wall_k.unwrap_or(settled_k);
-                row_wall_k = settled_k + (from_k - settled_k) * state.wall.mean;
-                wall_k = Some(settled_k + (from_k - settled_k) * state.wall.kept);
-            }
-            t2_k += state.slopes[Input::Wall as usize][0] * row_wall_k;
-            wall_w += state.slopes[Input::Wall as usize][1] * row_wall_k;
+            let own = OwnChange {
+                outer_k: change.outer_k(),
+                by: [by(0), by(1), by(2), by(3)],
+                division: change.division.unwrap_or_default(),
+                bearing_w: change.heats_w[0] + state.heat[HEAT_PARAMETERS.len()][0] * change.outer_k(),
+            };
+            let mean_k = if self.division.others > 0 {
+                let (mean_k, end_k) = self.parts_change(state, &own, change.ln_capacity, parts_k);
+                parts_k = Some(end_k);
+                mean_k
+            } else {
+                [0.0; OTHERS]
+            };
+            let wall_k = self.division.wall_k(own.outer_k, &mean_k)
+                + own.division.wall_k(state.inputs.outer_k, &state.parts.mean_k);
             if i < self.lead {
                 continue;
             }
-            gas.push(t2_k);
+            let total = |which: usize| own.by[which] + state.slopes[Input::Wall as usize][which] * wall_k;
+            gas.push(total(0));
             if self.model.has_balance {
-                let added_w = heat_w + duct_w + state.heat[HEAT_PARAMETERS.len()] * outer_k;
-                let (gas_w, ln_outer) = if self.model.has_inner_wall {
-                    let off_k = state.inputs.wall_k - state.inputs.outer_k;
-                    let through_w = conductance_w_k * (row_wall_k - outer_k + ln_conductance * off_k);
-                    (through_w, ln_capacity - share * logit_inner)
-                } else {
-                    (wall_w, ln_capacity)
-                };
-                let ln_outer = ln_outer + state.ln_capacity_by_k * outer_k;
-                rates.push((gas_w + added_w) / state.outer_j_k - state.rate_k_s * ln_outer);
-                readings.push(reading_k);
+                let from_gas_w = self.gas_heat_w(state, 0, own.outer_k, (wall_k, total(1), total(3)), &own);
+                let rest_w = change.heats_w[1] + state.heat[HEAT_PARAMETERS.len()][1] * own.outer_k;
+                let mut outer_w = from_gas_w + own.bearing_w + rest_w + own.by[2];
+                for (part, part_k) in mean_k.into_iter().enumerate().take(self.division.others) {
+                    let off_k = state.parts.mean_k[part] - state.inputs.outer_k;
+                    outer_w += self.division.conductance_w_k[part] * (part_k - own.outer_k)
+                        + own.division.conductance_w_k[part] * off_k
+                        - self.division.bearing[part] * own.bearing_w
+                        - own.division.bearing[part] * state.bearing_w;
+                }
+                let ln_outer = change.ln_capacity
+                    + own.division.capacity[0] / self.division.capacity[0]
+                    + state.ln_capacity_by_k * own.outer_k;
+                rates.push(outer_w / state.outer_j_k - state.rate_k_s * ln_outer);
+                readings.push(change.reading_k);
             }
         }
         let mut column = self.probe.read(&gas, 0.0);
@@ -234,7 +244,68 @@ impl Linearised<'_> {
             let changes = integral(&self.step.rows, &rates);
             column.extend(changes.into_iter().zip(readings).map(|(change, reading)| change - reading));
         }
-        (column, wall_k.unwrap_or(0.0))
+        (column, parts_k.unwrap_or_default())
+    }
+
+    /// Change of the heat from the gas to a part (0: the outer one) that changes by `part_k`, W; `(wall_k, wall_w, contact_w_k)`: changes of
+    /// the mean wall, of the heat to it, and of the conductance.
+    fn gas_heat_w(
+        &self,
+        state: &RowState,
+        part: usize,
+        part_k: f64,
+        (wall_k, wall_w, contact_w_k): (f64, f64, f64),
+        own: &OwnChange,
+    ) -> f64 {
+        let at_k = part.checked_sub(1).map_or(state.inputs.outer_k, |other| state.parts.mean_k[other]);
+        let off_k = state.inputs.wall_k - at_k;
+        self.division.area[part] * (wall_w + contact_w_k * off_k + state.contact_w_k * (wall_k - part_k))
+            + own.division.area[part] * (state.path.wall_w + state.contact_w_k * off_k)
+    }
+
+    /// Mean change of each other part over a row, and that at its end. `from_k`: the changes at its begin; without a step before, the parts are
+    /// settled.
+    fn parts_change(
+        &self,
+        state: &RowState,
+        own: &OwnChange,
+        ln_capacity: f64,
+        from_k: Option<[f64; OTHERS]>,
+    ) -> ([f64; OTHERS], [f64; OTHERS]) {
+        let Division { others, area, conductance_w_k, capacity, bearing } = self.division;
+        let by_wall = state.slopes[Input::Wall as usize];
+        let settled_k = |part: usize, around_k: &[f64; OTHERS]| {
+            // The part's own temperature acts through `sum_w_k`.
+            let wall_k = self.division.wall_k(own.outer_k, around_k) - area[part + 1] * around_k[part]
+                + own.division.wall_k(state.inputs.outer_k, &state.parts.mean_k);
+            let wall = (wall_k, own.by[1] + by_wall[1] * wall_k, own.by[3] + by_wall[3] * wall_k);
+            let off_k = state.parts.mean_k[part] - state.inputs.outer_k;
+            let ln_capacity = ln_capacity + own.division.capacity[part + 1] / capacity[part + 1];
+            let driving_w = self.gas_heat_w(state, part + 1, 0.0, wall, own)
+                + conductance_w_k[part] * own.outer_k
+                - own.division.conductance_w_k[part] * off_k
+                + bearing[part] * own.bearing_w
+                + own.division.bearing[part] * state.bearing_w
+                - ln_capacity * state.parts.stored_w[part];
+            driving_w / state.parts.sum_w_k[part]
+        };
+        let from_k = from_k.unwrap_or_else(|| {
+            let mut around_k = [0.0; OTHERS];
+            for _ in 0..SETTLED_ROUNDS {
+                for part in 0..others {
+                    around_k[part] = settled_k(part, &around_k);
+                }
+            }
+            around_k
+        });
+        let (mut mean_k, mut end_k) = ([0.0; OTHERS], [0.0; OTHERS]);
+        for part in 0..others {
+            let settled_k = settled_k(part, &from_k);
+            let away_k = from_k[part] - settled_k;
+            mean_k[part] = settled_k + away_k * state.parts.mean[part];
+            end_k[part] = settled_k + away_k * state.parts.kept[part];
+        }
+        (mean_k, end_k)
     }
 
     /// Change of the readings by a function along the window of a channel of [`Smoothing`](crate::joint::step_model::rows::Smoothing).
@@ -265,34 +336,38 @@ impl Linearised<'_> {
                 SmoothedInput::Flow => Change::of(Input::Flow, value).and(Input::Eta, eta_by_flow(i) * value),
             }
         };
-        self.respond(change, Some(0.0)).0
+        self.respond(change, Some([0.0; OTHERS])).0
     }
 
     /// Change of the readings by an efficiency that is wrong by the surface's own slope.
     pub(crate) fn by_surface(&self, history: &StepHistory<'_>, shared: &SharedVector) -> Vec<f64> {
         let skipped = history.terms.len() - self.states.len();
         let surface = surface_of(shared);
-        self.respond(|i, _| Change::of(Input::Eta, dot(&history.terms[skipped + i], surface)), Some(0.0)).0
+        self.respond(
+            |i, _| Change::of(Input::Eta, dot(&history.terms[skipped + i], surface)),
+            Some([0.0; OTHERS]),
+        )
+        .0
     }
 
     pub(crate) fn by_local(&self, index: usize) -> Vec<f64> {
         match index {
-            ETA => self.respond(|_, _| Change::of(Input::Eta, 1.0), Some(0.0)).0,
-            LN_DEVIATION => self.respond(|_, _| Change::of(Input::LnH, 1.0), Some(0.0)).0,
-            STEP_HEAT => self.respond(|_, _| Change::heat(1.0), Some(0.0)).0,
+            ETA => self.respond(|_, _| Change::of(Input::Eta, 1.0), Some([0.0; OTHERS])).0,
+            LN_DEVIATION => self.respond(|_, _| Change::of(Input::LnH, 1.0), Some([0.0; OTHERS])).0,
+            STEP_HEAT => self.respond(|_, _| Change::heats([0.0, 1.0]), Some([0.0; OTHERS])).0,
             _ => self.of_t2(&self.probe.read(&vec![0.0; self.gas_k.len()], 1.0)),
         }
     }
 
-    /// The column of a shared parameter, and the change of the inner wall at the end. `start_k`: that at the start.
+    /// The column of a shared parameter, and the change of the other parts of the housing at the end. `start_k`: that at the start.
     pub(super) fn by_shared(
         &self,
         index: usize,
         history: &StepHistory<'_>,
         shared: &SharedVector,
         local: &LocalVector,
-        start_k: Option<f64>,
-    ) -> (Vec<f64>, f64) {
+        start_k: Option<[f64; OTHERS]>,
+    ) -> (Vec<f64>, [f64; OTHERS]) {
         let rows: Vec<&Row> = self
             .step
             .lead
@@ -307,13 +382,13 @@ impl Linearised<'_> {
         let input = |input: Input, of: &dyn Fn(&RowState, &Row) -> f64| {
             by(&|state, row, _| Change::of(input, of(state, row)))
         };
-        let with_t2 = |(mut column, end_k): (Vec<f64>, f64)| {
+        let with_t2 = |(mut column, end_k): (Vec<f64>, [f64; OTHERS])| {
             column.iter_mut().take(self.step.rows.len()).for_each(|value| *value += 1.0);
             (column, end_k)
         };
-        let nothing = || (self.of_t2(&vec![0.0; self.gas_k.len()]), 0.0);
+        let nothing = || (self.of_t2(&vec![0.0; self.gas_k.len()]), [0.0; OTHERS]);
         if let Some(place) = HEAT_PARAMETERS.iter().position(|parameter| *parameter == index) {
-            return by(&|state, _, _| Change::heat(state.heat[place]));
+            return by(&|state, _, _| Change::heats(state.heat[place]));
         }
         let skipped = history.terms.len() - self.states.len();
         match index {
@@ -335,7 +410,7 @@ impl Linearised<'_> {
             T2_GAIN => {
                 let probe_k = self.probe.read(&self.gas_k, local[FIRST_READING]);
                 let distances: Vec<f64> = probe_k.iter().map(|probe_k| probe_k - rest_k).collect();
-                (self.of_t2(&distances), 0.0)
+                (self.of_t2(&distances), [0.0; OTHERS])
             }
             TC_GAIN => by(&|_, row, _| Change::of_tc(rest_k - row.tc_k)),
             P1_GAIN => {
@@ -350,9 +425,11 @@ impl Linearised<'_> {
             THERMOMETERS => with_t2(by(&|_, _, _| Change::of_tc(-1.0).and(Input::T1, -1.0))),
             TC_LAG => by(&|_, row, _| Change::of_tc(row.tc_slope_k_s)),
             LN_CAPACITY => by(&|_, _, _| Change { ln_capacity: 1.0, ..Change::default() }),
-            LOGIT_INNER => by(&|_, _, _| Change { logit_inner: 1.0, ..Change::default() }),
-            LN_INNER_CONDUCTANCE => by(&|_, _, _| Change { ln_conductance: 1.0, ..Change::default() }),
-            PROBE_MM2 => (self.by_probe(shared, local), 0.0),
+            _ if self.model.parts.parameters().contains(&index) => {
+                let division = Some(Division::slope(self.model.parts, shared, index));
+                by(&|_, _, _| Change { division, ..Change::default() })
+            }
+            PROBE_MM2 => (self.by_probe(shared, local), [0.0; OTHERS]),
             SURFACE.. => by(&|_, _, i| {
                 Change::of(
                     Input::Eta,
@@ -423,11 +500,14 @@ mod tests {
 
     use super::*;
     use crate::IdentifyConfig;
-    use crate::joint::step_model::parameters::{LOCAL, SHARED};
+    use crate::joint::step_model::parameters::{
+        LN_THIRD_CONDUCTANCE, LOCAL, LOGIT_AREA, LOGIT_BEARING, LOGIT_INNER, LOGIT_THIRD, LOGIT_THIRD_AREA,
+        SHARED,
+    };
     use crate::joint::step_model::rows::Smoothing;
     use nalgebra::DMatrix;
 
-    fn model(has_inner_wall: bool) -> Model {
+    fn model(parts: Parts) -> Model {
         let config = IdentifyConfig::default();
         let setting = Setting {
             internal_area_m2: config.internal_area_m2,
@@ -437,7 +517,7 @@ mod tests {
             air: config.air,
             reynolds_reference: 1.3e5,
         };
-        Model { setting, housing: config.housing, has_inner_wall, has_balance: true }
+        Model { setting, housing: config.housing, parts, has_balance: true }
     }
 
     /// A step after a jump: the housing warms up, flow and P2 settle.
@@ -475,7 +555,7 @@ mod tests {
         }
     }
 
-    /// Every column against a central difference of the prediction, with and without an inner wall, before and behind the linear part of the
+    /// Every column against a central difference of the prediction, for each division of the housing, before and behind the linear part of the
     /// probe's lag.
     #[test]
     fn columns_are_derivatives() {
@@ -493,12 +573,18 @@ mod tests {
         shared[TC_LAG] = 1.5;
         shared[LOGIT_INNER] = -0.5;
         shared[LN_INNER_CONDUCTANCE] = 3.0;
+        shared[LOGIT_AREA] = -0.3;
+        shared[LOGIT_BEARING] = 0.5;
+        shared[LOGIT_THIRD] = -1.0;
+        shared[LN_THIRD_CONDUCTANCE] = 2.0;
+        shared[LOGIT_THIRD_AREA] = -0.7;
         shared[GAINS + 1] = 0.01;
         shared[SURFACE] = 0.6;
         shared[SURFACE + 1] = 0.1;
         let local = [0.7, 0.01, 399.0, 2.0];
-        for (has_inner_wall, square_mm2) in [(false, 0.04), (false, 2.0), (true, 0.04), (true, 2.0)] {
-            let model = model(has_inner_wall);
+        let all = [Parts::One, Parts::InnerWall, Parts::Two, Parts::Three];
+        for (parts, square_mm2) in all.into_iter().flat_map(|parts| [(parts, 0.04), (parts, 2.0)]) {
+            let model = model(parts);
             shared[PROBE_MM2] = square_mm2;
             let predict = |shared: &SharedVector, local: &LocalVector| {
                 model.predict(&history, (shared, local), &[false; SHARED], false, None).readings_k
@@ -525,10 +611,10 @@ mod tests {
                 let size = expected.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
                 for (row, (found, expected)) in columns[index].iter().zip(&expected).enumerate() {
                     // Coefficients along a row of the inner wall are held, and so is its start: 5 % of the largest.
-                    let allowed = if has_inner_wall { 0.05 } else { 2e-2 } * size + 1e-6;
+                    let allowed = if parts == Parts::One { 2e-2 } else { 0.05 } * size + 1e-6;
                     assert!(
                         (found - expected).abs() <= allowed,
-                        "inner wall {has_inner_wall}, parameter {index}, row {row}: {found} and {expected}, largest {size}"
+                        "{parts:?}, parameter {index}, row {row}: {found} and {expected}, largest {size}"
                     );
                 }
             }

@@ -4,4 +4,5 @@ pub(crate) mod gas_path;
 pub(crate) mod history;
 pub(crate) mod linearised;
 pub(crate) mod parameters;
+pub(crate) mod parts;
 pub(crate) mod rows;

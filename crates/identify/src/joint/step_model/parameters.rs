@@ -79,8 +79,18 @@ pub(crate) const HEAT_BY_TC: Place = HOUSING + 7;
 pub(crate) const LOGIT_INNER: Place = HOUSING + 8;
 /// ln of the conductance between that inner wall and the rest, W/K.
 pub(crate) const LN_INNER_CONDUCTANCE: Place = HOUSING + 9;
+/// Logit of the outer part's share of the area that the gas touches.
+pub(crate) const LOGIT_AREA: Place = HOUSING + 10;
+/// Logit of the second part's share of the heat from the bearing.
+pub(crate) const LOGIT_BEARING: Place = HOUSING + 11;
+/// Logit of a third part's share of the heat capacity that the second does not have.
+pub(crate) const LOGIT_THIRD: Place = HOUSING + 12;
+/// ln of the conductance between it and the outer part, W/K.
+pub(crate) const LN_THIRD_CONDUCTANCE: Place = HOUSING + 13;
+/// Logit of its share of the area that the outer part does not have.
+pub(crate) const LOGIT_THIRD_AREA: Place = HOUSING + 14;
 /// First coefficient of the efficiency surface.
-pub(crate) const SURFACE: Place = HOUSING + 10;
+pub(crate) const SURFACE: Place = HOUSING + 15;
 /// Number of shared parameters.
 pub(crate) const SHARED: usize = SURFACE + TERM_COUNT;
 
@@ -149,7 +159,7 @@ pub(crate) const REFINEMENTS: [Refinement; 5] = [
 
 /// Range of each bounded parameter while a fit searches, and its largest change in one step. Bound: wider than any machine, within the
 /// equations' domain, and over the change the readings are nearly linear. Values just below 0 let a fit near 0 be normal.
-const RANGES: [(Place, f64, f64, f64); 9] = [
+const RANGES: [(Place, f64, f64, f64); 13] = [
     (LN_COEFFICIENT, f64::NEG_INFINITY, f64::INFINITY, 0.4),
     (ALPHA, -0.05, 0.7, 0.1),
     (PROBE_MM2, -0.5, 100.0, 1.5),
@@ -159,12 +169,17 @@ const RANGES: [(Place, f64, f64, f64); 9] = [
     (BEARING, -0.95, 10.0, f64::INFINITY),
     (TC_LAG, -2.0, 60.0, 2.0),
     (LOGIT_INNER, -4.0, 4.0, 1.0),
+    (LOGIT_AREA, -5.0, 5.0, 1.0),
+    (LOGIT_BEARING, -5.0, 5.0, 1.0),
+    (LOGIT_THIRD, -4.0, 4.0, 1.0),
+    (LOGIT_THIRD_AREA, -5.0, 5.0, 1.0),
 ];
-/// The same of the inner wall's conductance. Bound: 1.6 W/K to 8 kW/K.
-const CONDUCTANCE_RANGE: (Place, f64, f64, f64) = (LN_INNER_CONDUCTANCE, 0.5, 9.0, 1.0);
+/// The same of the conductances between the parts of the housing. Bound: 0.2 W/K to 8 kW/K.
+const CONDUCTANCE_RANGES: [(Place, f64, f64, f64); 2] =
+    [(LN_INNER_CONDUCTANCE, -1.5, 9.0, 1.0), (LN_THIRD_CONDUCTANCE, -1.5, 9.0, 1.0)];
 
 fn range(index: Place) -> Option<(Place, f64, f64, f64)> {
-    RANGES.into_iter().chain([CONDUCTANCE_RANGE]).find(|(place, ..)| *place == index)
+    RANGES.into_iter().chain(CONDUCTANCE_RANGES).find(|(place, ..)| *place == index)
 }
 
 /// Range of a shared parameter while a fit searches.
@@ -202,6 +217,11 @@ pub(crate) fn symbol(index: usize) -> String {
         HEAT_BY_TC => "heat from another source by Tc",
         LOGIT_INNER => "capacity of the inner wall",
         LN_INNER_CONDUCTANCE => "conductance of the inner wall",
+        LOGIT_AREA => "area of the part with Tc",
+        LOGIT_BEARING => "place of the heat from the bearing",
+        LOGIT_THIRD => "capacity of a third part",
+        LN_THIRD_CONDUCTANCE => "conductance of a third part",
+        LOGIT_THIRD_AREA => "area of a third part",
         GAINS..BAROMETER => return format!("gain of {}", GAIN_CHANNELS[index - GAINS]),
         _ => match OFFSET_CHANNELS.get(index.wrapping_sub(OFFSETS)) {
             Some(channel) => return format!("offset of {channel}"),

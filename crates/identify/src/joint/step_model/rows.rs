@@ -21,7 +21,7 @@ pub(crate) const COARSER: f64 = 2.0;
 /// Number of blocks after that time in a long window. Bound: the cost of a step grows with the cube of its rows, and a housing's time constant
 /// of minutes has dozens of them.
 const MAX_LATE_BLOCKS: f64 = 60.0;
-/// Gap between two rows above which the inner wall starts settled, s. Bound: twenty time constants of a wall of a few hundred J/K behind 15
+/// Gap between two rows above which the other parts of the housing start settled, s. Bound: twenty time constants of a wall of a few hundred J/K behind 15
 /// W/K are longer, but the operating point in a gap is not known.
 pub(crate) const MAX_ROW_GAP_S: f64 = 5.0;
 
@@ -60,7 +60,7 @@ impl Row {
 pub(crate) struct StepRows {
     /// Position in the recording.
     pub(crate) position: usize,
-    /// Rows from the jump to the window, which only carry the inner wall's temperature.
+    /// Rows from the jump to the window, which only carry the temperatures of the housing's other parts.
     pub(crate) lead: Vec<Row>,
     pub(crate) rows: Vec<Row>,
     /// Means over the step's end: one additional row that is not fitted.

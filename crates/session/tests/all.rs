@@ -4,6 +4,7 @@
 mod commission;
 mod common;
 mod hostile_plans;
+mod housing;
 mod joint_plan;
 mod reduce;
 mod speed;

@@ -501,8 +501,8 @@ mod tests {
     use super::*;
     use crate::IdentifyConfig;
     use crate::joint::step_model::parameters::{
-        LN_THIRD_CONDUCTANCE, LOCAL, LOGIT_AREA, LOGIT_BEARING, LOGIT_INNER, LOGIT_THIRD, LOGIT_THIRD_AREA,
-        SHARED,
+        LN_INNER_CONDUCTANCE, LN_THIRD_CONDUCTANCE, LOCAL, LOGIT_AREA, LOGIT_BEARING, LOGIT_INNER,
+        LOGIT_THIRD, LOGIT_THIRD_AREA, SHARED,
     };
     use crate::joint::step_model::rows::Smoothing;
     use nalgebra::DMatrix;

@@ -233,3 +233,75 @@ impl Around<'_> {
 fn mean_decay(x: f64) -> f64 {
     if x.abs() < SERIES_BELOW { 1.0 - 0.5 * x } else { -(-x).exp_m1() / x }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::IdentifyConfig;
+    use crate::joint::step_model::parameters::{EXPONENT, LN_COEFFICIENT, SHARED};
+    use mapper_physics::rig::sensor_fault::ExactReadings;
+
+    /// Whatever the division, the parts take what the gas gives: at rest no part stores heat, so the gas heat, the bearing's share and what
+    /// flows to the outer part add up. Rounding, and the end of the iteration.
+    #[test]
+    fn settled_parts_pass_on_the_heat_of_gas_and_bearing() {
+        let config = IdentifyConfig::default();
+        let setting = Setting {
+            internal_area_m2: config.internal_area_m2,
+            outlet_diameter_m: config.outlet_diameter_m,
+            inlet_diameter_m: config.inlet_diameter_m,
+            exact_at: ExactReadings { pressure_pa: 100e3, temperature_k: 297.0 },
+            air: config.air,
+            reynolds_reference: 1.3e5,
+        };
+        let mut shared = [0.0; SHARED];
+        shared[LN_COEFFICIENT] = 0.004_f64.ln() + 1.13 * 1.3e5_f64.ln();
+        shared[EXPONENT] = 1.13;
+        for (parameter, value) in
+            Parts::Three.parameters().iter().zip([-0.5, 3.0, -0.3, 0.5, -1.0, 2.0, -0.7])
+        {
+            shared[*parameter] = value;
+        }
+        let inputs = Inputs {
+            t1_k: 297.0,
+            wall_k: 340.0,
+            outer_k: 340.0,
+            p1_pa: 99e3,
+            p2_pa: 220e3,
+            flow_kg_s: 0.06,
+            eta: 0.7,
+            ln_h: 0.0,
+            alpha_area_ratio: 0.0,
+            ln_heating_cooling_ratio: 0.0,
+            preheat_w_k: 0.0,
+            inlet_power: 0.0,
+            humidity_kg_kg: 0.0,
+        };
+        for parts in [Parts::InnerWall, Parts::Two, Parts::Three] {
+            let division = Division::of(parts, &shared);
+            for shares in [division.capacity, division.area] {
+                assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{parts:?}");
+            }
+            let around =
+                Around { setting: &setting, shared: &shared, division: &division, inputs, bearing_w: 50.0 };
+            let settled_k = around.settled_k();
+            let wall_k = division.wall_k(inputs.outer_k, &settled_k);
+            let (gas_w, _, contact_w_k) = setting.wall_heat(&Inputs { wall_k, ..inputs }, &shared);
+            let to_outer_w = division.area[0] * (gas_w + contact_w_k * (wall_k - inputs.outer_k));
+            let passed_w: f64 = (0..division.others)
+                .map(|p| {
+                    division.conductance_w_k[p] * (settled_k[p] - inputs.outer_k) - division.bearing[p] * 50.0
+                })
+                .sum();
+            assert!(
+                (gas_w - to_outer_w - passed_w).abs() < 1e-3 * gas_w.abs(),
+                "{parts:?}: {gas_w} {to_outer_w} {passed_w}"
+            );
+            // Over a long row they stay there.
+            let (end_k, row) = around.along(settled_k, 900.0, 100.0);
+            for p in 0..division.others {
+                assert!((end_k[p] - settled_k[p]).abs() < 1e-2 && row.stored_w[p].abs() < 0.1, "{parts:?}");
+            }
+        }
+    }
+}

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::common::shipped::campaign;
-use crate::common::{Driven, driven};
+use crate::common::{Driven, driven, driven_to_the_end};
 use mapper_campaign::Campaign;
-use mapper_core::{AvoidedTime, EventKind};
+use mapper_core::{AvoidedTime, EventKind, GuardName, RunEnding};
 use mapper_session::{nominal_model, plan};
 use proptest::prelude::*;
 
@@ -57,6 +57,31 @@ fn a_slow_pressure_that_nobody_declared_causes_no_overspeed() {
             driven.events.iter().any(|event| event.message.contains("rig.actuators")),
             "{lab}: the run says that the stand is slower than declared"
         );
+    }
+}
+
+/// A valve that acknowledges its commands and stays where it is stops the run seconds after its second command if the guard says so.
+#[test]
+fn a_valve_that_does_not_move_ends_the_run_within_seconds() {
+    let campaign =
+        stand("{effects: {valve_stuck: 1}}", "guards: {valve: {reaction: safe}}\n", 1, "speed: 170 krpm");
+    let (driven, end) = driven_to_the_end(&campaign);
+    let RunEnding::Tripped(trip) = end else { panic!("{end:?}") };
+    assert_eq!(trip.guard, GuardName::Valve);
+    let [others @ .., last] = driven.steps.as_slice() else { panic!("no step") };
+    let opening = |step: &crate::common::Step| step.marker.valve_opening_ratio;
+    assert!(others.iter().all(|step| opening(step) == opening(&others[0])));
+    assert_ne!(opening(last), opening(&others[0]));
+    let after_s = trip.t_s - last.marker.start_s;
+    assert!(after_s < 10.0, "{after_s} s");
+}
+
+/// A valve that is slower than declared, or has play, follows: no guard acts.
+#[test]
+fn a_valve_that_follows_late_or_with_play_is_not_stuck() {
+    for lab in ["{actuators: {valve: {lag: 1 s, slew: 0.1 1/s}}}", "{actuators: {valve_play: 5 %}}"] {
+        let events = driven(&stand(lab, "", 1, "speed: 170 krpm")).events;
+        assert!(events.iter().all(|event| event.kind != EventKind::GuardActed), "{lab}: {events:?}");
     }
 }
 

@@ -346,6 +346,9 @@ impl Run<'_, '_> {
         } else if !running {
             self.commanded.jumped_s = None;
         }
+        let opening_ratio = setpoints.valve_opening_ratio;
+        let known = self.commanded.valve.filter(|(before_ratio, _)| *before_ratio == opening_ratio);
+        self.commanded.valve = known.or(Some((opening_ratio, self.now_s)));
         (self.commanded.running, self.sent) = (running, Some(setpoints));
         Ok(())
     }

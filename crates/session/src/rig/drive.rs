@@ -1,8 +1,11 @@
 //! Drives a rig, with the guards that it lacks.
 
 use crate::SessionError;
+use crate::recording::identification_config::identification;
+use crate::rig::valve_watch::ValveWatch;
 use mapper_campaign::{Campaign, DEFAULT_MAX_AGE_S};
 use mapper_core::{Backend, Channel, Clock, GuardName, PlanStep, RigDescription, RunEnding, UnpacedClock};
+use mapper_identify::ValveCheck;
 use mapper_physics::laws::thermocouple;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::settled::speed_response;
@@ -63,7 +66,8 @@ pub fn drive_paced(
     pace: Pace<'_>,
 ) -> Result<RunEnding, RunError> {
     let rig = backend.describe();
-    let guards = make_guards(campaign, &rig, pace.auxiliary_channels);
+    let mut guards = make_guards(campaign, &rig, pace.auxiliary_channels);
+    guards.extend(valve_watch(campaign, model, &rig));
     let mut with_soak;
     let steps: &mut dyn StepSource = match campaign.zero {
         None => steps,
@@ -207,6 +211,13 @@ pub fn make_guards(
         guards.push(Box::new(StartCheck::new(rig.channels.clone())));
     }
     guards
+}
+
+/// The guard of the valve, if the rig drives it.
+fn valve_watch(campaign: &Campaign, model: &Model, rig: &RigDescription) -> Option<Box<dyn Guard>> {
+    let reaction = campaign.guard_set().valve.filter(|_| rig.controls)?;
+    let check = ValveCheck::new(identification(campaign), model.clone(), campaign.tolerances);
+    Some(Box::new(ValveWatch::new(check, reaction, campaign.rig_actuators().valve.follow_s())))
 }
 
 /// Number of samples that a source may miss before it counts as silent.

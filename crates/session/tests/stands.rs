@@ -103,9 +103,8 @@ fn no_step_stays_within_the_speeds_to_avoid() {
             let Some(recorded) = time.slowest(&avoid) else { continue };
             crossings += 1;
             assert!(recorded.inside_s <= recorded.range.longest_s, "{actuators}: {recorded:?}");
-            // The samples are 0.1 s apart. The loop leaves the speed before the jump up to 1.5 % off and corrects P3 by as much, and a jump
-            // that ends near the range approaches it so slowly that this is half of the time.
-            let stated_s = 0.3 + 1.5 * planned_s;
+            // The samples are 0.1 s apart, and the loop has corrected P3 by up to some per cent.
+            let stated_s = 0.3 + 1.1 * planned_s;
             assert!(recorded.inside_s <= stated_s, "{actuators}: {recorded:?}, {planned_s} s planned");
         }
         assert!(crossings >= 4, "{actuators}: jumps between 50 and 110 krpm cross the range");

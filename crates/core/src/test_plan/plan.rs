@@ -270,6 +270,16 @@ impl Ramps {
         }
     }
 
+    /// Share of its change by which the valve may be ahead of a falling P3: P3 need not arrive exactly. Judgement.
+    pub const AHEAD_SHARE: f64 = 0.03;
+    /// Fall of P3, relative, above which the valve waits for it. Judgement: below, the reading is not clearly above its noise.
+    const MIN_FALL_RATIO: f64 = 0.02;
+
+    /// Whether the valve moves no further than P3 has fallen.
+    pub fn valve_waits(from_pa: f64, to_pa: f64) -> bool {
+        to_pa < from_pa * (1.0 - Self::MIN_FALL_RATIO)
+    }
+
     /// End of the last ramp after the start of the step, s.
     pub fn end_s(&self) -> f64 {
         self.p3.end_s().max(self.valve.end_s())

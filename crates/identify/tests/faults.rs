@@ -150,6 +150,16 @@ fn a_valve_with_play_is_named_and_leaves_the_points_as_they_are() {
     }
 }
 
+/// The recording with commands of its own in all steps after the first three, in which the valve stands at 0.8.
+fn visited_once(recording: &Recording) -> Recording {
+    let mut once = recording.clone();
+    once.steps.truncate(7);
+    for (step, command) in once.steps[4..].iter_mut().zip([1.6, 1.1, 0.6]) {
+        step.valve_opening_ratio = command;
+    }
+    once
+}
+
 /// A valve that stands at 0.8 while openings of 0.5 to 1.8 are commanded is named with these steps. Their points carry the opening that their
 /// flow has, and keep their numbers. The valve moves again afterwards.
 #[test]
@@ -175,6 +185,11 @@ fn a_valve_that_stands_still_is_named_and_its_points_carry_the_true_opening() {
         };
         assert_eq!((first, last), (3, 6));
         assert!((opening_ratio - 0.8).abs() < 0.03 && (fault.value - 1.0).abs() < 0.1, "{fault:?}");
+        // The opening that no other step has is known if openings are areas.
+        let config = IdentifyConfig { opening_is_area: true, ..drawn.config.clone() };
+        let once = Drawn { recording: visited_once(&drawn.recording), config, is_declared };
+        let [fault] = &found(&once, &once.recording).faults[..] else { panic!("no fault") };
+        assert!(matches!(fault.suspect, Suspect::Machine(Machine::ValveStuck { .. })), "{fault:?}");
         for (as_commanded, point) in followed.points.iter().zip(&stuck.points) {
             let (as_commanded, point) = (as_commanded.as_ref().unwrap(), point.as_ref().unwrap());
             assert_eq!((point.eta, point.verdict), (as_commanded.eta, as_commanded.verdict));

@@ -69,7 +69,7 @@ pub(crate) fn hypotheses(
     let noise = end_readings::noise(config, recording);
     let reference = config.reference;
     let mut balances: Vec<Rows> = Vec::new();
-    balances.extend(valve::valve_rows(&opened, &noise, nominal));
+    balances.extend(valve::valve_rows(&opened, &noise, nominal, config.opening_is_area));
     balances.extend(balances::efficiency::head_rows(&readings, &noise, reference, nominal));
     let used: Vec<bool> = all.iter().map(Option::is_some).collect();
     balances.extend(balances::housing::rows(recording, config, &used));

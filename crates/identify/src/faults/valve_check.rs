@@ -57,8 +57,7 @@ impl ValveCheck {
     ) -> ValveState {
         let [earlier, latest] = [earlier, later].map(|values| self.readings(values));
         let change = (ln_area(&latest) - ln_area(&earlier)).abs();
-        // Also if it is not a number.
-        if !(change < AT_REST_RATIO) {
+        if change.is_nan() || change >= AT_REST_RATIO {
             return ValveState::Unknown;
         }
         let before = self.commands.last().map(|(opening, _)| *opening);
@@ -89,7 +88,7 @@ impl ValveCheck {
         let noise = CHANNELS.map(|channel| {
             self.config.sensor(channel).noise_sigma * colour.variance_of_mean(samples, duration_s).sqrt()
         });
-        let rows = valve_rows(&self.commands, &noise, Some(&nominal))?;
+        let rows = valve_rows(&self.commands, &noise, Some(&nominal), true)?;
         let opening = |machine: &Machine| match machine {
             Machine::ValveStuck { last, opening_ratio, .. } if *last == step => Some(*opening_ratio),
             _ => None,

@@ -8,7 +8,7 @@ use crate::faults::end_readings::{PerChannel, Readings};
 use crate::faults::found_fault::Machine;
 use crate::faults::nominal_rig::NominalRig;
 use mapper_core::StepMarker;
-use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
+use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean, median};
 use mapper_observe::model_inputs::lagged_command::SAFE_OPENING;
 use mapper_observe::perturbation::UNINFORMATIVE;
 use mapper_physics::laws::turbine;
@@ -24,6 +24,8 @@ const BACK_PRESSURE_SIGMA_PA: f64 = 300.0;
 const DISCHARGE_RATIO: f64 = 0.02;
 /// Difference of the logarithm of the pressure ratio over which it varies. Judgement: half a speed line.
 const DISCHARGE_LENGTH: f64 = 0.5;
+/// Deviation of a valve's area from its opening, one standard deviation. Bound: the linearity of characterised valves is some per cent of their span.
+const OPENING_RATIO: f64 = 0.1;
 /// Repeatability of a valve's area, one standard deviation. Bound: a positioner resolves some tenths of a per cent of the travel.
 const VALVE_REPEATABILITY: f64 = 0.005;
 
@@ -55,6 +57,7 @@ pub(crate) fn valve_rows(
     steps: &[(Opening, Readings)],
     noise: &PerChannel,
     nominal: Option<&NominalRig<'_>>,
+    opening_is_area: bool,
 ) -> Option<Rows> {
     let known = |step: &&(Opening, Readings)| {
         let (opening, readings) = step;
@@ -92,11 +95,20 @@ pub(crate) fn valve_rows(
             covariance += discharge;
             let any = UNINFORMATIVE * VALVE_REPEATABILITY;
             let same = |i: usize, j: usize| openings[i].is_same_as(&openings[j]);
-            covariance += DMatrix::from_fn(count, count, |i, j| if same(i, j) { any * any } else { 0.0 });
-            vec![mean(areas.iter().copied()).unwrap_or_default(); count]
+            let own_area = if opening_is_area { OPENING_RATIO } else { any };
+            covariance +=
+                DMatrix::from_fn(count, count, |i, j| if same(i, j) { own_area * own_area } else { 0.0 });
+            let ln_opening = |opening: &Opening| if opening_is_area { opening.position.ln() } else { 0.0 };
+            if opening_is_area {
+                covariance += common(&vec![1.0; count], any);
+            }
+            let off = areas.iter().zip(&openings).map(|(area, opening)| area - ln_opening(opening));
+            let nominal_area = median(off.collect::<Vec<f64>>().iter()).unwrap_or_default();
+            openings.iter().map(|opening| nominal_area + ln_opening(opening)).collect()
         }
     };
-    by_machine.extend(stuck(&openings, &areas, nominal.map(|_| expected.as_slice())));
+    let of_command = (nominal.is_some() || opening_is_area).then_some(expected.as_slice());
+    by_machine.extend(stuck(&openings, &areas, of_command));
     Some(Rows {
         residual: areas.iter().zip(expected).map(|(area, expected)| area - expected).collect(),
         covariance,

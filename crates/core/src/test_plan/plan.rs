@@ -270,9 +270,10 @@ impl Ramps {
         }
     }
 
-    /// Share of its change by which the valve may be ahead of a falling P3: P3 need not arrive exactly. Judgement.
+    /// Share of its change by which the valve may be ahead of a falling P3. Bound: the rest of a lag takes longer than all before, and is
+    /// within the error of its reading.
     pub const AHEAD_SHARE: f64 = 0.03;
-    /// Fall of P3, relative, above which the valve waits for it. Judgement: below, the reading is not clearly above its noise.
+    /// Fall of P3, relative, above which the valve waits for it. Bound: a smaller one is not clearly above the noise of its reading.
     const MIN_FALL_RATIO: f64 = 0.02;
 
     /// Whether the valve moves no further than P3 has fallen.

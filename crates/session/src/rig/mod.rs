@@ -4,4 +4,3 @@ pub(crate) mod drive;
 pub(crate) mod observers;
 pub(crate) mod rig_state;
 pub(crate) mod sources;
-pub(crate) mod valve_watch;

@@ -149,7 +149,7 @@ fn can_be_guarded(candidate: &Candidate<'_>) -> CheckResult {
             GuardName::TurbineInletPressure => Channel::P3,
             GuardName::OilTemperature => Channel::TOil,
             GuardName::HousingGradient => Channel::Tc,
-            GuardName::Surge => Channel::CompressorFlow,
+            GuardName::Surge | GuardName::Valve => Channel::CompressorFlow,
             GuardName::Signals | GuardName::Rig => continue,
         };
         ensure!(

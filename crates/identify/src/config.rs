@@ -89,6 +89,8 @@ pub struct IdentifyConfig {
     pub exact_at: ExactReadings,
     /// Declared play of the back-pressure valve, opening.
     pub valve_play_ratio: f64,
+    /// Whether openings are areas relative to the nominal one, as in the program's own recordings; otherwise any number of a stand.
+    pub opening_is_area: bool,
     /// Error that all absolute pressures share, one standard deviation, Pa: of the barometer to which gauge pressures are added, and what an
     /// isothermal zero cannot show.
     pub barometer_sigma_pa: f64,
@@ -144,6 +146,7 @@ impl Default for IdentifyConfig {
             humidity_sigma_kg_kg: 0.0,
             exact_at: ExactReadings::default(),
             valve_play_ratio: 0.0,
+            opening_is_area: false,
             barometer_sigma_pa: 0.0,
             barometer_pa: None,
             thermometer_sigma_k: 0.0,

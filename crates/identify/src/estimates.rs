@@ -1,6 +1,7 @@
 //! The estimates of all steps by the configured method, and the faults of sensors and machine that explain contradictions between them.
 
 use crate::evidence::Evidence;
+use crate::faults::Hypotheses;
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::faults::balances::standstill::standstills;
 use crate::faults::found_fault::{FoundFault, Suspect};
@@ -13,7 +14,6 @@ use crate::step_data::end_state::EndState;
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, StepError, faults, joint};
 use mapper_core::{LeftOut, Method, Recording, ThermalModel, Warning};
-use mapper_inference::hypotheses::{Likelihood, Priors};
 
 /// The estimate of each step, in order, with everything that was found about it.
 pub(crate) struct Estimated {
@@ -37,11 +37,9 @@ impl Estimated {
         let ends = std::mem::take(&mut evidence.ends);
         let standstills = standstills(recording, config);
         let likelihood = |fitted: Option<&FittedEfficiencies>| {
-            whole.then(|| faults::likelihood(recording, &ends, fitted, config, nominal, &standstills))?
+            whole.then(|| faults::hypotheses(recording, &ends, fitted, config, nominal, &standstills))?
         };
-        let find = |(likelihood, priors): &(Likelihood, Priors)| {
-            faults::find(likelihood, priors, config.method, &standstills)
-        };
+        let find = |hypotheses: &Hypotheses| faults::find(hypotheses, config.method, &standstills);
         let mut balances = likelihood(None);
         let mut faults = balances.as_ref().map(find).unwrap_or_default();
         let is_refused = faults.iter().any(|fault| fault.touches_points) || evidence.is_refused();
@@ -72,7 +70,7 @@ impl Estimated {
                 findings[*position].doubt_first(failed_check.warning.clone());
             }
         }
-        let errors = balances.map(|(likelihood, priors)| faults::standard_errors(&likelihood, &priors));
+        let errors = balances.as_ref().map(faults::standard_errors);
         let steps = states.into_iter().zip(findings).collect();
         Estimated { steps, estimates, thermal, dynamic, faults, detectable: errors.unwrap_or_default() }
     }

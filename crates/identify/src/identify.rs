@@ -77,7 +77,7 @@ pub fn identify_recording(
     let evidence = Evidence::of(recording, config);
     let estimated = Estimated::of(evidence, recording, config, nominal.as_ref());
     let Estimated { steps, estimates, thermal, dynamic, faults, detectable } = estimated;
-    let (points, budgets) = points_with_budgets(recording, steps, &estimates, config);
+    let (points, budgets) = points_with_budgets(recording, steps, &estimates, &faults, config);
     let of_steps = points.iter().zip(&estimates);
     let with_errors =
         of_steps.filter_map(|(point, estimate)| Some((point.as_ref().ok()?, estimate.eta_errors.as_slice())));

@@ -38,10 +38,10 @@ pub use blade_count::{BladeCount, blade_count};
 pub use config::{
     Allowance, DeclaredUncertainty, Housing, IdentifyConfig, NoiseColour, PressureTap, Thresholds,
 };
-pub use faults::balance_rows::Machine;
 pub use faults::end_readings::MAX_CORRELATED_ROWS;
-pub use faults::found_fault::{FoundFault, Suspect};
+pub use faults::found_fault::{FoundFault, Machine, Suspect};
 pub use faults::nominal_rig::NominalRig;
+pub use faults::valve_check::{ValveCheck, ValveState};
 pub use identify::{Identified, identify, identify_each, identify_recording};
 pub use isothermal_zero::groups::ZeroSettings;
 pub use isothermal_zero::periodic::PeriodicError;

@@ -1,6 +1,7 @@
 //! The points of a recording: estimates with their state, interval, common errors and budgets.
 
 use crate::allowance;
+use crate::faults::found_fault::FoundFault;
 use crate::single_step::budgets;
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::EndState;
@@ -15,21 +16,26 @@ pub(crate) fn points_with_budgets(
     recording: &Recording,
     found: Vec<(Result<EndState, StepError>, Findings)>,
     estimates: &[Estimate],
+    faults: &[FoundFault],
     config: &IdentifyConfig,
 ) -> (Vec<Result<IdentifiedPoint, StepError>>, Vec<PointBudgets>) {
     let mut all = Vec::new();
-    let mut of_step =
-        |step: &StepMarker, (state, findings): (Result<EndState, StepError>, _), estimate: &Estimate| {
-            let state = state?;
-            let point = point(step, &state, estimate, findings, config);
-            let start_s = step.end_s - config.thresholds.end_mean_s;
-            let samples = |channel: Channel| {
-                recording.series.get(&channel).map_or(1, |series| series.range(start_s, step.end_s).len())
-            };
-            let eta_allowance = point.eta.and_then(|eta| allowance::budget(eta, &state, config));
-            all.push(budgets::of_point(&point, eta_allowance, estimate, samples, config));
-            Ok(point)
+    let mut of_step = |step: &StepMarker,
+                       (state, findings): (Result<EndState, StepError>, _),
+                       estimate: &Estimate| {
+        let state = state?;
+        let mut point = point(step, &state, estimate, findings, config);
+        if let Some(opening_ratio) = faults.iter().find_map(|fault| fault.valve_opening_ratio(step.index)) {
+            point.valve_opening_ratio = opening_ratio;
+        }
+        let start_s = step.end_s - config.thresholds.end_mean_s;
+        let samples = |channel: Channel| {
+            recording.series.get(&channel).map_or(1, |series| series.range(start_s, step.end_s).len())
         };
+        let eta_allowance = point.eta.and_then(|eta| allowance::budget(eta, &state, config));
+        all.push(budgets::of_point(&point, eta_allowance, estimate, samples, config));
+        Ok(point)
+    };
     let steps = recording.steps.iter().zip(found).zip(estimates);
     let points = steps.map(|((step, found), estimate)| of_step(step, found, estimate)).collect();
     (points, all)

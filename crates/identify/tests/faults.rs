@@ -150,6 +150,54 @@ fn a_valve_with_play_is_named_and_leaves_the_points_as_they_are() {
     }
 }
 
+/// The recording with commands of its own in all steps after the first three, in which the valve stands at 0.8.
+fn visited_once(recording: &Recording) -> Recording {
+    let mut once = recording.clone();
+    once.steps.truncate(7);
+    for (step, command) in once.steps[4..].iter_mut().zip([1.6, 1.1, 0.6]) {
+        step.valve_opening_ratio = command;
+    }
+    once
+}
+
+/// A valve that stands at 0.8 while openings of 0.5 to 1.8 are commanded is named with these steps. Their points carry the opening that their
+/// flow has, and keep their numbers. The valve moves again afterwards.
+#[test]
+fn a_valve_that_stands_still_is_named_and_its_points_carry_the_true_opening() {
+    let points: Vec<(f64, f64)> = [1.2, 0.5, 1.8, 0.8, 0.8, 0.8, 0.8, 1.8, 0.5, 1.2, 0.8, 0.5]
+        .into_iter()
+        .zip([70e3, 110e3, 150e3, 90e3, 130e3, 60e3, 150e3, 80e3, 50e3, 130e3, 50e3, 140e3])
+        .collect();
+    let clean = campaign(&points, 60.0, LabMachine::default());
+    let (recording, declared) = measured(&clean.recording, 1.0, 1.0, &mut Pcg64::seed_from_u64(3));
+    let config = IdentifyConfig { method: Method::Joint, declared, ..IdentifyConfig::default() };
+    for is_declared in [true, false] {
+        let mut drawn = Drawn { recording: recording.clone(), config: config.clone(), is_declared };
+        let followed = found(&drawn, &drawn.recording);
+        assert!(followed.faults.is_empty(), "{:?}", followed.faults);
+        for (index, command) in [(4, 1.8), (5, 1.2), (6, 0.5)] {
+            drawn.recording.steps[index].valve_opening_ratio = command;
+        }
+        let stuck = found(&drawn, &drawn.recording);
+        let [fault] = stuck.faults.as_slice() else { panic!("{:?}", stuck.faults) };
+        let Suspect::Machine(Machine::ValveStuck { first, last, opening_ratio }) = fault.suspect else {
+            panic!("{fault:?}")
+        };
+        assert_eq!((first, last), (3, 6));
+        assert!((opening_ratio - 0.8).abs() < 0.03 && (fault.value - 1.0).abs() < 0.1, "{fault:?}");
+        // The opening that no other step has is known if openings are areas.
+        let config = IdentifyConfig { opening_is_area: true, ..drawn.config.clone() };
+        let once = Drawn { recording: visited_once(&drawn.recording), config, is_declared };
+        let [fault] = &found(&once, &once.recording).faults[..] else { panic!("no fault") };
+        assert!(matches!(fault.suspect, Suspect::Machine(Machine::ValveStuck { .. })), "{fault:?}");
+        for (as_commanded, point) in followed.points.iter().zip(&stuck.points) {
+            let (as_commanded, point) = (as_commanded.as_ref().unwrap(), point.as_ref().unwrap());
+            assert_eq!((point.eta, point.verdict), (as_commanded.eta, as_commanded.verdict));
+            assert!((point.valve_opening_ratio - as_commanded.valve_opening_ratio).abs() < 0.03, "{point:?}");
+        }
+    }
+}
+
 #[test]
 fn faults_are_found_and_named_and_none_is_invented() {
     let seeds: Vec<u64> = (9000..9000 + machines()).collect();

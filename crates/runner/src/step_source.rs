@@ -63,6 +63,11 @@ pub trait StepSource {
     /// The next step; `None` ends the run. Its index counts up from 0. Blocks unless [`is_ready`](Self::is_ready) returned true.
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError>;
 
+    /// Time without air before the latest step, s; none by default.
+    fn rest_s(&self) -> f64 {
+        self.inner().map_or(0.0, StepSource::rest_s)
+    }
+
     /// Called when the latest step starts with its jump, and again if a guard requests that the step is repeated. Does nothing by default.
     fn before_step(&mut self, marker: &StepMarker) {
         if let Some(inner) = self.inner_mut() {

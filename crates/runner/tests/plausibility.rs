@@ -5,7 +5,7 @@ use mapper_runner::{CommandedState, PlausibilityWatch, ReadingBounds};
 
 const INTERVAL_S: f64 = 0.1;
 const RUNNING: CommandedState =
-    CommandedState { running: true, step_since_s: None, aim: None, jumped_s: None };
+    CommandedState { running: true, step_since_s: None, aim: None, valve: None, jumped_s: None };
 
 /// A steady point: pressure ratio 1.8, efficiency 70 %.
 const STEADY: [(Channel, f64); 8] = [

@@ -4,7 +4,7 @@ use crate::error::throw;
 use crate::request::Refusal;
 use crate::session::{ScriptThrow, Session, lock};
 use crate::settle::{EndCondition, StepResult};
-use mapper_core::{IdentifiedPoint, OperatingPoint};
+use mapper_core::{CHANNELS, Channel, IdentifiedPoint, OperatingPoint};
 use mapper_yaml::units::Kind;
 use rhai::{Array, Dynamic, Engine, FLOAT, INT, ImmutableString};
 use std::sync::{Arc, Mutex};
@@ -76,12 +76,10 @@ table! {
             engine.register_fn("point", |speed: &str, opening: FLOAT| parse_point(speed, opening));
             engine.register_fn("point", |speed: &str, opening: INT| parse_point(speed, opening as FLOAT));
         };
-        "p.speed_rpm", "Shaft speed, rpm." => |engine, _| {
-            engine.register_get("speed_rpm", |point: &mut Point| point.0.speed_rpm);
-        };
-        "p.opening", "Valve opening relative to the nominal area." => |engine, _| {
-            engine.register_get("opening", |point: &mut Point| point.0.valve_opening_ratio);
-        };
+        "p.speed_rpm", "Shaft speed, rpm." =>
+            |engine, _| { engine.register_get("speed_rpm", |point: &mut Point| point.0.speed_rpm); };
+        "p.opening", "Valve opening relative to the nominal area." =>
+            |engine, _| { engine.register_get("opening", |point: &mut Point| point.0.valve_opening_ratio); };
         "midpoint(a, b)", "The point halfway in speed and in opening." => |engine, _| {
             engine.register_fn("midpoint", |a: Point, b: Point| Point(OperatingPoint {
                 speed_rpm: 0.5 * (a.0.speed_rpm + b.0.speed_rpm),
@@ -149,6 +147,20 @@ table! {
                 lock(&session).settle(point.0, max_s, rate_k_s)
             });
         };
+        "hold(time)", "Waits at the point of the last step, without a jump, and returns the result of this time." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("hold", move |time: &str| {
+                let duration_s = parse_quantity(Kind::Duration, time)?;
+                lock(&session).hold(duration_s)
+            });
+        };
+        "rest(time)", "Air off before the next step: the machine stands still for this time, and the next step starts it. What its sensors then read differently counts as it does after a soak." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("rest", move |time: &str| {
+                let duration_s = parse_quantity(Kind::Duration, time)?;
+                lock(&session).rest(duration_s)
+            });
+        };
         "repeat(n)", "Repeats step `n` by the same jump, so that the two can be compared: goes to the start of the jump if necessary, and jumps again. Returns the result of the jump." => |engine, session| {
             let session = session.clone();
             engine.register_fn("repeat", move |number: INT| lock(&session).repeat(number));
@@ -165,51 +177,42 @@ table! {
                 lock(&session).results.iter().cloned().map(Dynamic::from).collect()
             });
         };
-        "r.step", "Number of the step, from 1." => |engine, _| {
-            engine.register_get("step", |result: &mut StepResult| result.number as INT);
+        "r.step", "Number of the step, from 1." =>
+            |engine, _| { engine.register_get("step", |result: &mut StepResult| result.number as INT); };
+        "r.point", "Target of the step." =>
+            |engine, _| { engine.register_get("point", |result: &mut StepResult| Point(result.target)); };
+        "r.verdict", "`\"good\"`, `\"doubtful\"` or `\"unusable\"`." =>
+            |engine, _| { engine.register_get("verdict", |result: &mut StepResult| ImmutableString::from(result.verdict())); };
+        "r.warnings", "Codes of the reasons for the verdict, e.g. `small_gradient`." =>
+            |engine, _| { engine.register_get("warnings", |result: &mut StepResult| warning_codes(result)); };
+        "r.has_eta", "Whether the step has an efficiency. The first step of a run has none, because it has no jump." =>
+            |engine, _| { engine.register_get("has_eta", |result: &mut StepResult| result.eta().is_some()); };
+        "r.eta", "Efficiency, fraction." =>
+            |engine, _| { engine.register_get("eta", |result: &mut StepResult| number_or_unit(result.eta())); };
+        "r.sigma_eta", "Its standard error, fraction; 1 without an efficiency, so that `r.sigma_eta > 0.005` is true." =>
+            |engine, _| { engine.register_get("sigma_eta", |result: &mut StepResult| result.sigma_eta().min(SIGMA_ETA_MAX)); };
+        "r.h_w_m2k", "Heat-transfer coefficient, W/(m2 K)." =>
+            |engine, _| { engine.register_get("h_w_m2k", |result: &mut StepResult| number_or_unit(result.h_w_m2k())); };
+        "r.sigma_h_w_m2k", "Its standard error, W/(m2 K); 1e6 without a coefficient." =>
+            |engine, _| { engine.register_get("sigma_h_w_m2k", |result: &mut StepResult| result.sigma_h_w_m2k().min(SIGMA_H_MAX_W_M2K)); };
+        "r.speed_rpm", "Measured shaft speed at the end of the step, rpm." =>
+            |engine, _| { register_measurement(engine, "speed_rpm", |point| Some(point.speed_rpm)); };
+        "r.flow_kg_s", "Compressor mass flow at the end of the step, kg/s." =>
+            |engine, _| { register_measurement(engine, "flow_kg_s", |point| Some(point.flow_kg_s)); };
+        "r.pressure_ratio", "Total pressure ratio at the end of the step." =>
+            |engine, _| { register_measurement(engine, "pressure_ratio", |point| Some(point.pressure_ratio)); };
+        "r.dt2_k", "Change of T2 over the window, K." =>
+            |engine, _| { register_measurement(engine, "dt2_k", |point| point.dt2_k); };
+        "r.dtc_k", "Change of the housing temperature over the window, K." =>
+            |engine, _| { register_measurement(engine, "dtc_k", |point| point.dtc_k); };
+        "r.mean(channel)", "Mean reading of a channel over the second half of the step, e.g. `r.mean(\"P2\")`, in its SI unit or rpm; `()` if it was not recorded." => |engine, _| {
+            engine.register_fn("mean", |result: &mut StepResult, channel: &str| reading(result, channel, |(mean, _)| mean));
         };
-        "r.point", "Target of the step." => |engine, _| {
-            engine.register_get("point", |result: &mut StepResult| Point(result.target));
+        "r.variance(channel)", "Variance of the same readings, in the square of this unit. Near surge that of pressures and flow grows." => |engine, _| {
+            engine.register_fn("variance", |result: &mut StepResult, channel: &str| reading(result, channel, |(_, variance)| variance));
         };
-        "r.verdict", "`\"good\"`, `\"doubtful\"` or `\"unusable\"`." => |engine, _| {
-            engine.register_get("verdict", |result: &mut StepResult| ImmutableString::from(result.verdict()));
-        };
-        "r.warnings", "Codes of the reasons for the verdict, e.g. `small_gradient`." => |engine, _| {
-            engine.register_get("warnings", |result: &mut StepResult| warning_codes(result));
-        };
-        "r.has_eta", "Whether the step has an efficiency. The first step of a run has none, because it has no jump." => |engine, _| {
-            engine.register_get("has_eta", |result: &mut StepResult| result.eta().is_some());
-        };
-        "r.eta", "Efficiency, fraction." => |engine, _| {
-            engine.register_get("eta", |result: &mut StepResult| number_or_unit(result.eta()));
-        };
-        "r.sigma_eta", "Its standard error, fraction; 1 without an efficiency, so that `r.sigma_eta > 0.005` is true." => |engine, _| {
-            engine.register_get("sigma_eta", |result: &mut StepResult| result.sigma_eta().min(SIGMA_ETA_MAX));
-        };
-        "r.h_w_m2k", "Heat-transfer coefficient, W/(m2 K)." => |engine, _| {
-            engine.register_get("h_w_m2k", |result: &mut StepResult| number_or_unit(result.h_w_m2k()));
-        };
-        "r.sigma_h_w_m2k", "Its standard error, W/(m2 K); 1e6 without a coefficient." => |engine, _| {
-            engine.register_get("sigma_h_w_m2k", |result: &mut StepResult| result.sigma_h_w_m2k().min(SIGMA_H_MAX_W_M2K));
-        };
-        "r.speed_rpm", "Measured shaft speed at the end of the step, rpm." => |engine, _| {
-            register_measurement(engine, "speed_rpm", |point| Some(point.speed_rpm));
-        };
-        "r.flow_kg_s", "Compressor mass flow at the end of the step, kg/s." => |engine, _| {
-            register_measurement(engine, "flow_kg_s", |point| Some(point.flow_kg_s));
-        };
-        "r.pressure_ratio", "Total pressure ratio at the end of the step." => |engine, _| {
-            register_measurement(engine, "pressure_ratio", |point| Some(point.pressure_ratio));
-        };
-        "r.dt2_k", "Change of T2 over the window, K." => |engine, _| {
-            register_measurement(engine, "dt2_k", |point| point.dt2_k);
-        };
-        "r.dtc_k", "Change of the housing temperature over the window, K." => |engine, _| {
-            register_measurement(engine, "dtc_k", |point| point.dtc_k);
-        };
-        "r.duration_s", "Duration of the step, s." => |engine, _| {
-            engine.register_get("duration_s", |result: &mut StepResult| result.end_s - result.start_s);
-        };
+        "r.duration_s", "Duration of the step, s." =>
+            |engine, _| { engine.register_get("duration_s", |result: &mut StepResult| result.end_s - result.start_s); };
     }
     "Other" {
         "elapsed_s()", "Time since the start of the run, warm-up included, s." => |engine, session| {
@@ -228,6 +231,15 @@ fn register_measurement(engine: &mut Engine, name: &'static str, value: fn(&Iden
     engine.register_get(name, move |result: &mut StepResult| {
         number_or_unit(result.identified.as_ref().and_then(value).filter(|value| value.is_finite()))
     });
+}
+
+fn reading(result: &StepResult, channel: &str, of: fn((f64, f64)) -> f64) -> Result<Dynamic, ScriptThrow> {
+    let unknown = |_| {
+        let names = CHANNELS.iter().map(|row| row.channel.to_string()).collect::<Vec<_>>().join(", ");
+        throw(format!("there is no channel `{channel}`"), &format!("one of {names}"))
+    };
+    let channel: Channel = channel.parse().map_err(unknown)?;
+    Ok(number_or_unit(result.readings.get(&channel).copied().map(of)))
 }
 
 fn number_or_unit(value: Option<f64>) -> Dynamic {

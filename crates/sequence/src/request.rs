@@ -4,6 +4,7 @@ use mapper_core::{
     Limits, OperatingPoint, Predicted, RigActuators, SetpointRanges, SettleBands, Timing, Transition,
     WindowRule,
 };
+use mapper_physics::laws::housing::{StandstillState, relax};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::forecast::{forecast_step, hold, warm_up_state};
 use mapper_physics::operating_point::reach::{FollowOutlet, describe_obstacles, reach};
@@ -74,6 +75,8 @@ pub(crate) struct StepPrediction {
 pub(crate) struct NominalForecast {
     /// State at the start of the current step; `None` before the first.
     state: Option<State>,
+    /// Its housings at the end of a rest before the step.
+    at_rest: Option<StandstillState>,
     /// Steady state of the latest step's point.
     from: Option<SteadyState>,
     /// Planned duration of the current step, s, and its final state.
@@ -82,7 +85,7 @@ pub(crate) struct NominalForecast {
 
 impl NominalForecast {
     pub(crate) fn new() -> Self {
-        NominalForecast { state: None, from: None, planned: None }
+        NominalForecast { state: None, at_rest: None, from: None, planned: None }
     }
 
     /// Predicts the result of a step to `target`, with its duration, s, and its way from the point before.
@@ -94,9 +97,12 @@ impl NominalForecast {
         target: &SteadyState,
         dwell_s: f64,
     ) -> Result<StepPrediction, SimulationError> {
-        let state = match self.state {
-            Some(state) => state,
-            None => warm_up_state(&request.model, target.state, &target.boundary, request.timing.warm_up_s)?,
+        let state = match (self.at_rest.take(), self.state) {
+            (Some(StandstillState { tc_k, tt_k }), _) => State { tc_k, tt_k, ..target.state },
+            (None, Some(state)) => state,
+            (None, None) => {
+                warm_up_state(&request.model, target.state, &target.boundary, request.timing.warm_up_s)?
+            }
         };
         self.state = Some(state);
         let (step, transition, dwell_s) = match self.from.replace(*target) {
@@ -114,6 +120,17 @@ impl NominalForecast {
         self.planned = Some((dwell_s, step.end));
         let predicted = step.predicted(&request.window, &request.settle_bands, transition.is_some());
         Ok(StepPrediction { predicted, transition, dwell_s })
+    }
+
+    /// Lets the machine rest without air: its housings cool, and the next step has no point before.
+    pub(crate) fn rest(&mut self, request: &SequenceRequest, duration_s: f64) {
+        self.from = None;
+        let BoundaryConditions { oil_temperature_k, ambient_temperature_k, .. } = request.boundary;
+        if let Some(State { tc_k, tt_k, .. }) = self.state {
+            let warm = StandstillState { tc_k, tt_k };
+            let params = &request.model.params;
+            self.at_rest = Some(relax(params, warm, oil_temperature_k, ambient_temperature_k, duration_s));
+        }
     }
 
     /// Ends the current step after `duration_s`.

@@ -33,6 +33,8 @@ pub(crate) struct Session {
     pub request: SequenceRequest,
     /// Dwell time of the following points, s.
     pub dwell_s: f64,
+    /// Time without air before the next step, s.
+    rest_s: f64,
     pub results: Vec<StepResult>,
     nominal: NominalForecast,
     checks: usize,
@@ -53,6 +55,7 @@ impl Session {
         Session {
             dwell_s: request.timing.dwell.fixed_or_usual_s(),
             request,
+            rest_s: 0.0,
             results: Vec::new(),
             nominal: NominalForecast::new(),
             checks: 0,
@@ -77,7 +80,7 @@ impl Session {
 
     /// Run time at which the next step starts, s.
     pub fn now_s(&self) -> f64 {
-        self.results.last().map_or(self.request.timing.warm_up_s, |result| result.end_s)
+        self.results.last().map_or(self.request.timing.warm_up_s, |result| result.end_s) + self.rest_s
     }
 
     pub fn note(&mut self, text: &str) {
@@ -200,7 +203,12 @@ impl Session {
             let refused = accepts.check(&setpoints);
             refused.map_err(|error| throw(error.to_string(), "stay within the range of the rig"))?;
         }
-        let from = self.results.last().map(|result| result.target);
+        let rest_s = std::mem::take(&mut self.rest_s);
+        if rest_s > 0.0 {
+            self.nominal.rest(&self.request, rest_s);
+        }
+        // No jump leads from a machine at rest.
+        let from = self.results.last().filter(|_| rest_s == 0.0).map(|result| result.target);
         let fail = |error| throw(format!("the forecast of the step to {to} failed: {error}"), "");
         let StepPrediction { predicted, transition, dwell_s } =
             self.nominal.forecast(&self.request, &target, dwell_s).map_err(fail)?;
@@ -219,7 +227,7 @@ impl Session {
             predicted,
         };
         let notes = std::mem::take(&mut self.notes);
-        let step = Box::new(SequenceStep { step, end });
+        let step = Box::new(SequenceStep { step, end, rest_s });
         self.to_caller.send(ScriptMessage::Step(step, notes)).map_err(|_| stop_error())?;
         let result = self.wait()?.ok_or_else(stop_error)?;
         let duration_s = result.end_s - result.start_s;
@@ -227,6 +235,29 @@ impl Session {
         self.checks = self.checks.saturating_sub(1);
         self.results.push(result.clone());
         Ok(result)
+    }
+
+    /// Waits at the point of the last step.
+    pub fn hold(&mut self, duration_s: f64) -> Result<StepResult, ScriptThrow> {
+        let Some(last) = self.results.last() else {
+            return Err(throw("no step has been executed yet".into(), "jump to a point first"));
+        };
+        self.step(last.target, duration_s, EndCondition::Dwell)
+    }
+
+    /// Puts a standstill before the next step.
+    pub fn rest(&mut self, duration_s: f64) -> Result<(), ScriptThrow> {
+        if self.results.is_empty() {
+            let message = "the machine is at rest before the first step".into();
+            return Err(throw(message, "use `zero: {soak: ...}` of the campaign, or jump to a point first"));
+        }
+        if !(duration_s > 0.0 && self.rest_s + duration_s <= DWELL_LIMIT_S) {
+            let message =
+                format!("a rest may last more than 0 s and at most {DWELL_LIMIT_S} s, not {duration_s} s");
+            return Err(throw(message, "give a time such as \"5 min\""));
+        }
+        self.rest_s += duration_s;
+        Ok(())
     }
 
     /// Repeats a step by the same jump.

@@ -4,7 +4,7 @@ use crate::error::ScriptError;
 use mapper_core::{Channel, IdentifiedPoint, OperatingPoint, PlanStep, SampleBatch, SettleBands, Verdict};
 use mapper_numerics::statistics::median;
 use mapper_physics::operating_point::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// End condition of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,6 +22,8 @@ pub struct SequenceStep {
     pub step: PlanStep,
     /// Condition for an earlier end.
     pub end: EndCondition,
+    /// Time without air before the step, s.
+    pub rest_s: f64,
 }
 
 /// A message from the script's thread, with the notes since the last one.
@@ -47,6 +49,8 @@ pub struct StepResult {
     pub end_s: f64,
     /// The identified point; `None` if its position on the map is not known.
     pub identified: Option<IdentifiedPoint>,
+    /// Mean and variance of each recorded channel over the second half of the step, in its unit.
+    pub readings: BTreeMap<Channel, (f64, f64)>,
 }
 
 impl StepResult {

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{
-    CommonErrors, Dwell, IdentifiedPoint, Limits, Method, OperatingPoint, RigActuators, SetpointRange,
-    SetpointRanges, SettleBands, StepKind, Timing, Verdict, WindowRule,
+    Channel, CommonErrors, Dwell, IdentifiedPoint, Limits, Method, OperatingPoint, RigActuators,
+    SetpointRange, SetpointRanges, SettleBands, StepKind, Timing, Verdict, WindowRule,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
@@ -11,6 +11,7 @@ use mapper_sequence::{
     EndCondition, Script, ScriptError, SequenceError, SequenceRequest, SequenceRunner, SequenceStep,
     StepResult,
 };
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -94,7 +95,32 @@ fn answer(step: &SequenceStep) -> StepResult {
         start_s: step.start_s,
         end_s: step.start_s + step.dwell_s,
         identified: Some(point),
+        readings: BTreeMap::from([(Channel::P2, (150e3, 400.0))]),
     }
+}
+
+/// After a rest no jump leads to the step, and the rest passes before it; a wait stays where the machine is.
+#[test]
+fn a_rest_has_no_jump_after_it_and_a_wait_has_none_at_all() {
+    let script = "let p = grid()[0]; jump(p, \"60 s\"); rest(\"5 min\"); rest(\"5 min\"); jump(p, \"60 s\"); hold(\"30 s\");";
+    let steps = steps_of(script);
+    let [first, restarted, waited] = steps.as_slice() else { panic!("{steps:?}") };
+    assert_eq!((first.rest_s, restarted.rest_s, waited.rest_s), (0.0, 600.0, 0.0));
+    let end_s = first.step.start_s + first.step.dwell_s;
+    assert!((restarted.step.start_s - end_s - 600.0).abs() < 1e-9);
+    assert!(restarted.step.from.is_none() && restarted.step.transition.is_none());
+    assert_eq!((waited.step.from, waited.step.to), (Some(first.step.to), first.step.to));
+    assert!(play("rest(\"5 min\");").2.is_err() && play("hold(\"5 min\");").2.is_err());
+}
+
+#[test]
+fn a_script_reads_mean_and_variance_of_a_channel() {
+    let notes = play(
+        "let r = jump(grid()[0]); note(`${r.mean(\"P2\")} ${r.variance(\"P2\")} ${r.mean(\"T4\") == ()}`);",
+    )
+    .1;
+    assert_eq!(notes, ["150000.0 400.0 true"]);
+    assert!(play("jump(grid()[0]).mean(\"P9\");").2.is_err());
 }
 
 type Played = (Vec<SequenceStep>, Vec<String>, Result<(), SequenceError>);

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::common::shipped::campaign;
-use crate::common::{Driven, driven};
+use crate::common::{Driven, driven, driven_to_the_end};
 use mapper_campaign::Campaign;
-use mapper_core::{AvoidedTime, EventKind};
+use mapper_core::{AvoidedTime, EventKind, GuardName, RunEnding};
 use mapper_session::{nominal_model, plan};
 use proptest::prelude::*;
 
@@ -60,6 +60,31 @@ fn a_slow_pressure_that_nobody_declared_causes_no_overspeed() {
     }
 }
 
+/// A valve that acknowledges its commands and stays where it is stops the run seconds after its second command if the guard says so.
+#[test]
+fn a_valve_that_does_not_move_ends_the_run_within_seconds() {
+    let campaign =
+        stand("{effects: {valve_stuck: 1}}", "guards: {valve: {reaction: safe}}\n", 1, "speed: 170 krpm");
+    let (driven, end) = driven_to_the_end(&campaign);
+    let RunEnding::Tripped(trip) = end else { panic!("{end:?}") };
+    assert_eq!(trip.guard, GuardName::Valve);
+    let [others @ .., last] = driven.steps.as_slice() else { panic!("no step") };
+    let opening = |step: &crate::common::Step| step.marker.valve_opening_ratio;
+    assert!(others.iter().all(|step| opening(step) == opening(&others[0])));
+    assert_ne!(opening(last), opening(&others[0]));
+    let after_s = trip.t_s - last.marker.start_s;
+    assert!(after_s < 10.0, "{after_s} s");
+}
+
+/// A valve that is slower than declared, or has play, follows: no guard acts.
+#[test]
+fn a_valve_that_follows_late_or_with_play_is_not_stuck() {
+    for lab in ["{actuators: {valve: {lag: 1 s, slew: 0.1 1/s}}}", "{actuators: {valve_play: 5 %}}"] {
+        let events = driven(&stand(lab, "", 1, "speed: 170 krpm")).events;
+        assert!(events.iter().all(|event| event.kind != EventKind::GuardActed), "{lab}: {events:?}");
+    }
+}
+
 /// The shaft crosses the speeds to avoid as fast as the plan states, and within the time that is allowed.
 #[test]
 fn no_step_stays_within_the_speeds_to_avoid() {
@@ -78,9 +103,8 @@ fn no_step_stays_within_the_speeds_to_avoid() {
             let Some(recorded) = time.slowest(&avoid) else { continue };
             crossings += 1;
             assert!(recorded.inside_s <= recorded.range.longest_s, "{actuators}: {recorded:?}");
-            // The samples are 0.1 s apart. The loop leaves the speed before the jump up to 1.5 % off and corrects P3 by as much, and a jump
-            // that ends near the range approaches it so slowly that this is half of the time.
-            let stated_s = 0.3 + 1.5 * planned_s;
+            // The samples are 0.1 s apart, and the loop has corrected P3 by up to some per cent.
+            let stated_s = 0.3 + 1.1 * planned_s;
             assert!(recorded.inside_s <= stated_s, "{actuators}: {recorded:?}, {planned_s} s planned");
         }
         assert!(crossings >= 4, "{actuators}: jumps between 50 and 110 krpm cross the range");

@@ -26,7 +26,7 @@ macro_rules! effects {
             let mut all = vec![$(effect_of::<$name::$kind>()),*];
             let mut faults = sensor_fault::effects();
             // The order matters: blind cases draw effects by their index. Conduction along the probe is next to the probe.
-            let (probe, air) = (3, all.len() - 4);
+            let (probe, air) = (3, all.len() - 5);
             all.splice(air..air, faults.split_off(1));
             all.splice(probe..probe, faults);
             all
@@ -58,6 +58,7 @@ effects! {
     inlet_preheat::InletPreheat,
     slow_valve::SlowValve,
     valve_play::ValvePlay,
+    valve_stuck::ValveStuck,
 }
 
 /// Finds an effect by its id.

@@ -36,7 +36,7 @@ fn readings(rig: &Rig) -> Vec<f64> {
     let valve = rig.instruments.valve;
     let opening = |t_s: f64| {
         let left = if valve.lag_s > 0.0 { 0.2 * (-t_s / valve.lag_s).exp() } else { 0.0 };
-        to.valve_opening_ratio + 0.5 * valve.play_ratio + left
+        valve.reached(to.valve_opening_ratio + 0.5 * valve.play_ratio + left)
     };
     let row = |t_s: &f64| BoundaryConditions { p3_pa: p3_pa(*t_s), valve_opening_ratio: opening(*t_s), ..to };
     let rows = times.iter().map(row).collect();

@@ -35,6 +35,8 @@ fn every_example_is_planned_and_run() {
         ("adaptive", 9..=40, "measuring"),
         ("drift_anchored", 12..=12, "points off the first"),
         ("hysteresis", 5..=5, "on the way down"),
+        ("hot_restart", 5..=5, "colder a minute after the restart"),
+        ("surge_by_variance", 4..=20, "surge is near"),
     ] {
         let scratch = scratch();
         let campaign = mapper_tests::repository().join(format!("examples/sequences/{name}.yaml"));

@@ -100,7 +100,7 @@ pub struct IdentifiedPoint {
     pub target: Option<OperatingPoint>,
     /// Measured shaft speed at the end of the step, rpm.
     pub speed_rpm: f64,
-    /// Commanded valve opening relative to the nominal area; NaN (null in files) if it was not recorded.
+    /// Commanded valve opening relative to the nominal area, or that of the flow if the valve does not follow; NaN (null in files) if unknown.
     #[serde(rename = "valve", deserialize_with = "nan_where_null")]
     pub valve_opening_ratio: f64,
     /// Compressor mass flow at the end of the step, kg/s.

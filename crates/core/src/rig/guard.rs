@@ -26,6 +26,8 @@ named_enum! {
         Speed = "speed",
         /// Time within the speeds to avoid.
         AvoidedSpeed = "avoided_speed",
+        /// Flow through the back-pressure valve against its command.
+        Valve = "valve",
         /// Samples in order, in time, and not frozen.
         Signals = "signals",
         /// The state that the rig reports.
@@ -124,6 +126,8 @@ pub struct GuardSet {
     pub surge: Option<SurgeVariation>,
     /// Guard of the speed.
     pub speed: Option<SpeedBand>,
+    /// Reaction to a valve that does not follow its commands.
+    pub valve: Option<Reaction>,
     /// When the flow, which has no guard of its own, counts as frozen; `None`: not checked.
     pub frozen_flow: Option<FrozenLimit>,
 }
@@ -134,6 +138,7 @@ impl GuardSet {
         match name {
             GuardName::Surge => self.surge.is_some_and(|guard| guard.reaction.ends_the_run()),
             GuardName::Speed => self.speed.is_some_and(|guard| guard.reaction.ends_the_run()),
+            GuardName::Valve => self.valve.is_some_and(Reaction::ends_the_run),
             // Always present.
             GuardName::Signals | GuardName::Rig => true,
             name => self.signals.iter().any(|guard| {

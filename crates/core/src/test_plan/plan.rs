@@ -270,6 +270,17 @@ impl Ramps {
         }
     }
 
+    /// Share of its change by which the valve may be ahead of a falling P3. Bound: the rest of a lag takes longer than all before, and is
+    /// within the error of its reading.
+    pub const AHEAD_SHARE: f64 = 0.03;
+    /// Fall of P3, relative, above which the valve waits for it. Bound: a smaller one is not clearly above the noise of its reading.
+    const MIN_FALL_RATIO: f64 = 0.02;
+
+    /// Whether the valve moves no further than P3 has fallen.
+    pub fn valve_waits(from_pa: f64, to_pa: f64) -> bool {
+        to_pa < from_pa * (1.0 - Self::MIN_FALL_RATIO)
+    }
+
     /// End of the last ramp after the start of the step, s.
     pub fn end_s(&self) -> f64 {
         self.p3.end_s().max(self.valve.end_s())

@@ -1,9 +1,10 @@
 //! The rows of one balance, and the columns of all parameters that affect them.
 
 use crate::faults::end_readings::{CHANNELS, PerChannel, Readings};
+use crate::faults::found_fault::{Machine, Suspect};
 use mapper_core::{Channel, FaultKind};
 use mapper_inference::hypotheses::Balance;
-use mapper_physics::rig::sensor_fault::{SensorFault, additive};
+use mapper_physics::rig::sensor_fault::SensorFault;
 use nalgebra::{DMatrix, DVector};
 
 /// A balance of the recording.
@@ -22,37 +23,6 @@ pub(crate) struct Rows {
     /// Effects of faults of size 1 on each residual that differ from those of a constant error of the same size.
     pub(crate) by_fault: Vec<(Channel, FaultKind, Vec<f64>)>,
 }
-
-/// Machine properties that may differ from the declaration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Machine {
-    /// Flow of the compressor map, all over.
-    FlowCapacity,
-    /// Efficiency of the compressor map, all over.
-    Efficiency,
-    /// Area of the back-pressure valve.
-    ValveArea,
-    /// Play of its drive beyond the declared one, opening.
-    ValvePlay,
-    /// Heat transfer between gas and housing, all over.
-    Convection,
-    /// A condition of the rig, in the channel's unit.
-    Condition(Channel),
-}
-
-/// All of them, in the order of the parameters.
-pub(crate) const MACHINE: [Machine; 10] = [
-    Machine::FlowCapacity,
-    Machine::Efficiency,
-    Machine::ValveArea,
-    Machine::ValvePlay,
-    Machine::Convection,
-    Machine::Condition(Channel::P1),
-    Machine::Condition(Channel::T1),
-    Machine::Condition(Channel::T3),
-    Machine::Condition(Channel::TOil),
-    Machine::Condition(Channel::TAmb),
-];
 
 impl Rows {
     /// Effect of a fault of size 1 on each row.
@@ -89,8 +59,8 @@ impl Rows {
         )
     }
 
-    /// The balance with one column for each parameter: declared offsets and gains of [`CHANNELS`], the barometer, sensor faults, [`MACHINE`].
-    pub(crate) fn balance(&self) -> Balance {
+    /// The balance with one column for each parameter: declared offsets and gains of [`CHANNELS`], the barometer, the suspects.
+    pub(crate) fn balance(&self, suspects: &[Suspect]) -> Balance {
         let offsets =
             (0..CHANNELS.len()).map(|channel| self.column(|other, _| f64::from(u8::from(other == channel))));
         let gains = (0..CHANNELS.len()).map(|channel| {
@@ -101,16 +71,17 @@ impl Rows {
         });
         let pressure = |channel: usize| matches!(CHANNELS[channel], Channel::P1 | Channel::P2);
         let barometer = self.column(|channel, _| f64::from(u8::from(pressure(channel))));
-        let faults = additive().map(|fault| self.by_fault(fault));
-        let machine = MACHINE.iter().map(|machine| {
-            let own = self.by_machine.iter().find(|(own, _)| own == machine);
-            own.map_or_else(
-                || DVector::zeros(self.residual.len()),
-                |(_, column)| DVector::from_column_slice(column),
-            )
+        let by_suspect = suspects.iter().map(|suspect| match suspect {
+            Suspect::Sensor(fault) => self.by_fault(fault),
+            Suspect::Machine(machine) => {
+                let own = self.by_machine.iter().find(|(own, _)| own == machine);
+                own.map_or_else(
+                    || DVector::zeros(self.residual.len()),
+                    |(_, column)| DVector::from_column_slice(column),
+                )
+            }
         });
-        let columns: Vec<DVector<f64>> =
-            offsets.chain(gains).chain([barometer]).chain(faults).chain(machine).collect();
+        let columns: Vec<DVector<f64>> = offsets.chain(gains).chain([barometer]).chain(by_suspect).collect();
         Balance {
             residual: DVector::from_column_slice(&self.residual),
             covariance: self.covariance.clone(),

@@ -1,7 +1,6 @@
 //! A detected fault and its description.
 
-use crate::faults::balance_rows::Machine;
-use mapper_core::{Channel, FaultKind, SeenAtRest, SuspectedFault};
+use mapper_core::{Channel, FaultKind, SeenAtRest, SuspectedFault, step_number};
 use mapper_physics::rig::sensor_fault::SensorFault;
 use serde::{Serialize, Serializer};
 use std::fmt;
@@ -14,6 +13,46 @@ pub enum Suspect {
     /// The machine is not as declared, ratio.
     Machine(Machine),
 }
+
+/// Machine properties that may differ from the declaration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Machine {
+    /// Flow of the compressor map, all over.
+    FlowCapacity,
+    /// Efficiency of the compressor map, all over.
+    Efficiency,
+    /// Area of the back-pressure valve.
+    ValveArea,
+    /// Play of its drive beyond the declared one, opening.
+    ValvePlay,
+    /// Share of its commands that the valve does not follow in a series of steps, by their indices; 1 stands still at this opening.
+    ValveStuck {
+        /// The first of them.
+        first: usize,
+        /// The last of them.
+        last: usize,
+        /// The opening that its flow has.
+        opening_ratio: f64,
+    },
+    /// Heat transfer between gas and housing, all over.
+    Convection,
+    /// A condition of the rig, in the channel's unit.
+    Condition(Channel),
+}
+
+/// Those that every recording may have, in the order of the parameters; a valve that does not follow comes after them.
+pub(crate) const MACHINE: [Machine; 10] = [
+    Machine::FlowCapacity,
+    Machine::Efficiency,
+    Machine::ValveArea,
+    Machine::ValvePlay,
+    Machine::Convection,
+    Machine::Condition(Channel::P1),
+    Machine::Condition(Channel::T1),
+    Machine::Condition(Channel::T3),
+    Machine::Condition(Channel::TOil),
+    Machine::Condition(Channel::TAmb),
+];
 
 /// A fault that explains why the balances of a recording do not close.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +96,20 @@ impl Suspect {
     }
 }
 
+impl FoundFault {
+    /// The opening at which the valve stands in a step instead of following its command.
+    pub(crate) fn valve_opening_ratio(&self, step: usize) -> Option<f64> {
+        match self.suspect {
+            Suspect::Machine(Machine::ValveStuck { first, last, opening_ratio })
+                if (first..=last).contains(&step) =>
+            {
+                Some(opening_ratio)
+            }
+            _ => None,
+        }
+    }
+}
+
 impl From<&FoundFault> for SuspectedFault {
     fn from(found: &FoundFault) -> Self {
         SuspectedFault {
@@ -94,6 +147,12 @@ fn machine_name(machine: Machine) -> String {
         Machine::Efficiency => "efficiency of the declared map",
         Machine::ValveArea => "area of the declared valve",
         Machine::ValvePlay => "play of the back-pressure valve",
+        Machine::ValveStuck { first, last, .. } => {
+            let (first, last) = (step_number(first), step_number(last));
+            return format!(
+                "share of its commands that the back-pressure valve does not follow in steps {first} to {last}"
+            );
+        }
         Machine::Convection => "convection of the declared machine",
         Machine::Condition(channel) => return format!("{} ({channel})", channel.info().description),
     };

@@ -10,13 +10,15 @@ pub(crate) mod end_readings;
 pub(crate) mod found_fault;
 pub(crate) mod nominal_rig;
 pub(crate) mod possible;
+pub(crate) mod valve_check;
 
 use crate::IdentifyConfig;
-use crate::faults::balance_rows::{MACHINE, Machine, Rows};
+use crate::faults::balance_rows::Rows;
 use crate::faults::balances::efficiency::FittedEfficiencies;
-use crate::faults::balances::standstill::{self, Opening, Standstill, sides};
+use crate::faults::balances::standstill::{self, Standstill};
+use crate::faults::balances::valve::{self, Opening, sides};
 use crate::faults::end_readings::{CHANNELS, MAX_CORRELATED_ROWS, Readings, span_s};
-use crate::faults::found_fault::{FoundFault, Suspect};
+use crate::faults::found_fault::{FoundFault, MACHINE, Machine, Suspect};
 use crate::faults::nominal_rig::NominalRig;
 use crate::reading_checks::ends::{Ends, FailedCheck};
 use mapper_core::{Channel, FaultKind, Method, ModelTolerances, Recording, SuspectedFault, Warning};
@@ -32,31 +34,42 @@ const EXPECTED_FAULTS: f64 = 0.1;
 const OTHER_MACHINE_RATIO: f64 = 0.05;
 /// The same of convection. Source: correlations of heat transfer in pipes scatter by that much (Incropera, ch. 8.5).
 const OTHER_CONVECTION_RATIO: f64 = 0.2;
+/// Share of its commands that a valve does not follow, one standard deviation. Bound: 1 stands still.
+const STANDS_STILL_RATIO: f64 = 1.0;
 /// Play of a worn drive, opening, one standard deviation. Bound: twice that of a new pneumatic positioner.
 const OTHER_PLAY: f64 = 0.04;
 
-/// All balances of a recording, and the prior of the parameters. `ends`: of the usable steps. `fitted`: efficiencies of the joint fit, if
-/// available.
-pub(crate) fn likelihood(
+/// The balances of a recording, and what may explain that they do not close.
+pub(crate) struct Hypotheses {
+    pub(crate) likelihood: Likelihood,
+    pub(crate) priors: Priors,
+    /// In the order of the priors.
+    pub(crate) suspects: Vec<Suspect>,
+}
+
+/// All balances of a recording. `ends`: of the usable steps. `fitted`: efficiencies of the joint fit, if available.
+pub(crate) fn hypotheses(
     recording: &Recording,
     ends: &[Option<Ends>],
     fitted: Option<&FittedEfficiencies>,
     config: &IdentifyConfig,
     nominal: Option<&NominalRig<'_>>,
     standstills: &[Standstill],
-) -> Option<(Likelihood, Priors)> {
+) -> Option<Hypotheses> {
     let all = all_readings(recording, ends, config.exact_at)?;
     let readings: Vec<Readings> = all.iter().flatten().copied().collect();
     let opening = |((end, readings), side): ((&Option<Ends>, &Option<Readings>), f64)| {
-        let position = end.as_ref()?.valve_opening_ratio - 0.5 * config.valve_play_ratio * side;
-        Some((Opening { position, side }, (*readings)?))
+        let end = end.as_ref()?;
+        let position = end.valve_opening_ratio - 0.5 * config.valve_play_ratio * side;
+        let step = recording.steps.get(end.position)?.index;
+        Some((Opening { step, position, side }, (*readings)?))
     };
     let opened: Vec<(Opening, Readings)> =
         ends.iter().zip(&all).zip(sides(&recording.steps)).filter_map(opening).collect();
     let noise = end_readings::noise(config, recording);
     let reference = config.reference;
     let mut balances: Vec<Rows> = Vec::new();
-    balances.extend(balances::standstill::valve_rows(&opened, &noise, nominal));
+    balances.extend(valve::valve_rows(&opened, &noise, nominal, config.opening_is_area));
     balances.extend(balances::efficiency::head_rows(&readings, &noise, reference, nominal));
     let used: Vec<bool> = all.iter().map(Option::is_some).collect();
     // Its balance is that of one wall.
@@ -72,22 +85,30 @@ pub(crate) fn likelihood(
         );
         balances.extend(balances::standstill::condition_rows(recording, &all, config, nominal));
     }
-    let priors = priors(config, nominal);
-    let mut likelihood = Likelihood::new(priors.always.len() + priors.hypotheses.len());
-    for rows in balances {
-        // A balance without a density gives no evidence.
-        let _ = likelihood.add(&rows.balance());
+    Some(Hypotheses::of(&balances, config, nominal))
+}
+
+impl Hypotheses {
+    pub(crate) fn of(balances: &[Rows], config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Self {
+        let stuck = balances.iter().flat_map(|rows| &rows.by_machine).map(|(machine, _)| *machine);
+        let machine =
+            MACHINE.into_iter().chain(stuck.filter(|machine| matches!(machine, Machine::ValveStuck { .. })));
+        let suspects: Vec<Suspect> =
+            additive().map(|fault| Suspect::Sensor(*fault)).chain(machine.map(Suspect::Machine)).collect();
+        let steps = balances.iter().map(|rows| rows.residual.len()).max().unwrap_or_default();
+        let priors = priors(&suspects, steps, config, nominal);
+        let mut likelihood = Likelihood::new(priors.always.len() + priors.hypotheses.len());
+        for rows in balances {
+            // A balance without a density gives no evidence.
+            let _ = likelihood.add(&rows.balance(&suspects));
+        }
+        Hypotheses { likelihood, priors, suspects }
     }
-    Some((likelihood, priors))
 }
 
 /// Faults that explain why the balances of a recording do not close; empty if they close.
-pub(crate) fn find(
-    likelihood: &Likelihood,
-    priors: &Priors,
-    method: Method,
-    standstills: &[Standstill],
-) -> Vec<FoundFault> {
+pub(crate) fn find(hypotheses: &Hypotheses, method: Method, standstills: &[Standstill]) -> Vec<FoundFault> {
+    let suspect = |index: usize| hypotheses.suspects[index];
     let likelier_than = |member: &Member, limit: f64| -> Vec<Suspect> {
         let others = member.alternatives.iter().take_while(|(_, relative)| *relative > limit);
         others.map(|(index, _)| suspect(*index)).collect()
@@ -104,7 +125,8 @@ pub(crate) fn find(
             Suspect::Machine(_) => None,
         },
     };
-    likelihood.explain(priors).unwrap_or_default().members.into_iter().map(found).collect()
+    let explanation = hypotheses.likelihood.explain(&hypotheses.priors).unwrap_or_default();
+    explanation.members.into_iter().map(found).collect()
 }
 
 /// Whether a number of a compressor's point depends on it: none depends on valve or turbine, and an apparent efficiency does not depend on the housing.
@@ -113,7 +135,7 @@ fn touches_points(suspect: Suspect, method: Method) -> bool {
     let elsewhere = !channels.is_empty() && channels.iter().all(|channel| !CHANNELS.contains(channel));
     let housing = method == Method::Steady && channels == [Channel::Tc] || elsewhere;
     let measured = |machine| match machine {
-        Machine::ValveArea | Machine::ValvePlay | Machine::Condition(_) => true,
+        Machine::ValveArea | Machine::ValvePlay | Machine::ValveStuck { .. } | Machine::Condition(_) => true,
         Machine::FlowCapacity | Machine::Efficiency | Machine::Convection => false,
     };
     !(housing || matches!(suspect, Suspect::Machine(machine) if measured(machine)))
@@ -138,17 +160,9 @@ pub(crate) fn remark(faults: &[FoundFault]) -> Option<Warning> {
 }
 
 /// Standard error of each suspect's size from the balances, in its unit.
-pub(crate) fn standard_errors(likelihood: &Likelihood, priors: &Priors) -> Vec<(Suspect, f64)> {
-    let errors = likelihood.standard_errors(priors).unwrap_or_default();
-    errors.into_iter().enumerate().map(|(index, error)| (suspect(index), error)).collect()
-}
-
-/// The hypothesis at this position: the catalogue, then the machine.
-pub(crate) fn suspect(index: usize) -> Suspect {
-    match additive().nth(index) {
-        Some(fault) => Suspect::Sensor(*fault),
-        None => Suspect::Machine(MACHINE[index - additive().count()]),
-    }
+pub(crate) fn standard_errors(hypotheses: &Hypotheses) -> Vec<(Suspect, f64)> {
+    let errors = hypotheses.likelihood.standard_errors(&hypotheses.priors).unwrap_or_default();
+    hypotheses.suspects.iter().copied().zip(errors).collect()
 }
 
 /// The readings of all steps, by position; at most [`MAX_CORRELATED_ROWS`] of them.
@@ -166,7 +180,13 @@ pub(crate) fn all_readings(
     Some(ends.iter().enumerate().map(of).collect())
 }
 
-fn priors(config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Priors {
+/// Priors of these suspects. `steps`: among which a valve may begin and cease to stand still.
+fn priors(
+    suspects: &[Suspect],
+    steps: usize,
+    config: &IdentifyConfig,
+    nominal: Option<&NominalRig<'_>>,
+) -> Priors {
     let declared = |channel: &Channel| config.sensor(*channel);
     let gain = |channel: &Channel| match (declared(channel).gain_sigma_ratio, nominal) {
         (0.0, Some(nominal)) if *channel == Channel::CompressorFlow => {
@@ -176,23 +196,35 @@ fn priors(config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Priors {
     };
     let offsets = CHANNELS.iter().map(|channel| declared(channel).offset_sigma);
     let tolerances = nominal.map_or_else(ModelTolerances::default, |nominal| *nominal.tolerances);
-    let machine = MACHINE.iter().map(|machine| match machine {
-        Machine::Convection => OTHER_CONVECTION_RATIO,
+    let sigma = |suspect: &Suspect| match suspect {
+        Suspect::Sensor(fault) => fault.sigma,
+        Suspect::Machine(Machine::Convection) => OTHER_CONVECTION_RATIO,
         // Weather, altitude, another test: more than the tolerance of a condition explains. Each of these has one.
-        Machine::Condition(channel) => {
+        Suspect::Machine(Machine::Condition(channel)) => {
             EXCLUDE_SIGMAS * standstill::tolerance(*channel, &tolerances).unwrap_or(1.0)
         }
-        Machine::ValvePlay => OTHER_PLAY,
-        Machine::FlowCapacity | Machine::Efficiency | Machine::ValveArea => OTHER_MACHINE_RATIO,
-    });
-    let sigmas: Vec<f64> = additive().map(|fault| fault.sigma).chain(machine).collect();
+        Suspect::Machine(Machine::ValvePlay) => OTHER_PLAY,
+        Suspect::Machine(Machine::ValveStuck { .. }) => STANDS_STILL_RATIO,
+        Suspect::Machine(Machine::FlowCapacity | Machine::Efficiency | Machine::ValveArea) => {
+            OTHER_MACHINE_RATIO
+        }
+    };
+    let sigmas: Vec<f64> = suspects.iter().map(sigma).collect();
     let always = offsets.chain(CHANNELS.iter().map(gain)).chain([config.barometer_sigma_pa]).collect();
     let mut priors = Priors::even(always, &sigmas, EXPECTED_FAULTS);
-    for (index, hypothesis) in priors.hypotheses.iter_mut().enumerate() {
-        hypothesis.at_least_zero = match suspect(index) {
+    let mut valve = None;
+    for (index, (suspect, hypothesis)) in suspects.iter().zip(&mut priors.hypotheses).enumerate() {
+        hypothesis.at_least_zero = match suspect {
             Suspect::Sensor(fault) => fault.kind == FaultKind::TowardsWall,
-            Suspect::Machine(machine) => machine == Machine::ValvePlay,
+            Suspect::Machine(machine) => {
+                matches!(machine, Machine::ValvePlay | Machine::ValveStuck { .. })
+            }
         };
+        if matches!(suspect, Suspect::Machine(Machine::ValveStuck { .. })) {
+            // One of all pairs of a first and a last step.
+            hypothesis.family = *valve.get_or_insert(index);
+            hypothesis.ln_prior -= 2.0 * (steps.max(1) as f64).ln();
+        }
     }
     priors
 }

@@ -5,16 +5,16 @@
 //! determine few faults, and the intervals are valid for sensors as declared.
 
 use crate::IdentifyConfig;
+use crate::faults::Hypotheses;
 use crate::faults::balance_rows::Rows;
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::faults::balances::{efficiency, housing};
 use crate::faults::end_readings::Readings;
 use crate::faults::found_fault::Suspect;
-use crate::faults::suspect;
 use crate::single_step::budgets::own_row;
 use crate::single_step::dynamic::Estimate;
 use mapper_core::{EstimateUncertainty, half_width_95, standard_error_of};
-use mapper_inference::hypotheses::{Likelihood, Priors, Single};
+use mapper_inference::hypotheses::Single;
 use mapper_inference::mixture::MIN_WEIGHT;
 use nalgebra::DVector;
 
@@ -31,19 +31,20 @@ pub(crate) fn widen(
     estimates: &mut [Estimate],
     fitted: &FittedEfficiencies,
     readings: &[Option<Readings>],
-    (likelihood, priors): &(Likelihood, Priors),
+    hypotheses: &Hypotheses,
     config: &IdentifyConfig,
 ) -> Option<()> {
     let [etas, ln_hs] = [efficiency::measured(fitted, readings), housing::measured(fitted, readings, config)];
     let possible = |single: Single| {
-        let Suspect::Sensor(fault) = suspect(single.index) else { return None };
+        let Suspect::Sensor(fault) = hypotheses.suspects[single.index] else { return None };
         let effect = |rows: &Rows| rows.by_fault(&fault);
         (single.odds > MIN_WEIGHT).then(|| PossibleFault {
             size: (single.value, single.sigma),
             effects: [effect(&etas), effect(&ln_hs)],
         })
     };
-    let possible: Vec<PossibleFault> = likelihood.singles(priors)?.into_iter().filter_map(possible).collect();
+    let singles = hypotheses.likelihood.singles(&hypotheses.priors)?;
+    let possible: Vec<PossibleFault> = singles.into_iter().filter_map(possible).collect();
     let positions = fitted.positions.iter().filter(|position| readings[**position].is_some());
     for (row, position) in positions.enumerate() {
         widen_one(estimates.get_mut(*position)?, &possible, row);

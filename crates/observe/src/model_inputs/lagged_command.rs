@@ -165,11 +165,14 @@ impl LaggedCommand {
         LaggedCommand::new(self.levels.clone(), p3, valve)
     }
 
-    /// The same with a valve that lags by so much more and whose drive has so much more play.
+    /// The same with a valve that also moves like this.
     #[must_use]
     pub fn with_valve(&self, by: ValveMotion) -> LaggedCommand {
         let (lag_s, play) = ((self.valve.lag_s + by.lag_s).max(0.0), self.valve.play + by.play_ratio);
-        self.with_responses(self.p3, Response { lag_s, play, ..self.valve })
+        let reached =
+            |level: &Level| Level { valve_opening_ratio: by.reached(level.valve_opening_ratio), ..*level };
+        let levels = self.levels.iter().map(reached).collect();
+        LaggedCommand::new(levels, self.p3, Response { lag_s, play, ..self.valve })
     }
 
     /// The level commanded at `t_s`.

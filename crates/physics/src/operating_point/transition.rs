@@ -60,7 +60,8 @@ pub fn candidate_ramps(
 pub struct TransitionInputs {
     to: BoundaryConditions,
     p3_pa: FollowedRamp,
-    valve_ratio: FollowedRamp,
+    /// The parts of its command, one after the other.
+    valve_ratio: [FollowedRamp; VALVE_PARTS],
     t3_k: FollowedRamp,
 }
 
@@ -73,22 +74,13 @@ impl TransitionInputs {
         actuators: &RigActuators,
     ) -> Self {
         let t3_ramp = Ramp { start_s: 0.0, duration_s: actuators.t3.ramp_s(to.t3_k - from.t3_k) };
-        let follow = |from: f64, to: f64, ramp: &Ramp, motion: &ActuatorMotion| FollowedRamp {
-            from,
-            to,
-            ramp: Ramp { start_s: ramp.start_s + motion.dead_time_s, ..*ramp },
-            lag_s: motion.lag_s,
-        };
+        let p3_pa = FollowedRamp::new((from.p3_pa, to.p3_pa), &ramps.p3, &actuators.p3);
+        let opening = (from.valve_opening_ratio, to.valve_opening_ratio);
         TransitionInputs {
             to: *to,
-            p3_pa: follow(from.p3_pa, to.p3_pa, &ramps.p3, &actuators.p3),
-            valve_ratio: follow(
-                from.valve_opening_ratio,
-                to.valve_opening_ratio,
-                &ramps.valve,
-                &actuators.valve,
-            ),
-            t3_k: follow(from.t3_k, to.t3_k, &t3_ramp, &actuators.t3),
+            p3_pa,
+            valve_ratio: valve_parts(opening, &ramps.valve, &actuators.valve, &p3_pa),
+            t3_k: FollowedRamp::new((from.t3_k, to.t3_k), &t3_ramp, &actuators.t3),
         }
     }
 
@@ -99,22 +91,62 @@ impl TransitionInputs {
         TransitionInputs::new(boundary, boundary, &ramps, &RigActuators::default())
     }
 
-    fn channels(&self) -> [&FollowedRamp; 3] {
-        [&self.p3_pa, &self.valve_ratio, &self.t3_k]
+    /// Time after the start of the step until P3 and valve have arrived, s.
+    pub fn arrival_s(&self, actuators: &RigActuators) -> f64 {
+        let [.., valve] = &self.valve_ratio;
+        let of = |ramp: &FollowedRamp, motion: &ActuatorMotion| {
+            ramp.ramp.end_s() - motion.dead_time_s + motion.follow_s()
+        };
+        of(&self.p3_pa, &actuators.p3).max(of(valve, &actuators.valve))
+    }
+
+    fn channels(&self) -> impl Iterator<Item = &FollowedRamp> {
+        [&self.p3_pa, &self.t3_k].into_iter().chain(&self.valve_ratio)
     }
 }
 
-/// Time after the start of the step until P3 and valve have arrived, s.
-pub fn arrival_s(ramps: &Ramps, actuators: &RigActuators) -> f64 {
-    let p3_s = ramps.p3.end_s() + actuators.p3.follow_s();
-    p3_s.max(ramps.valve.end_s() + actuators.valve.follow_s())
+/// Number of straight parts of the valve's command while it waits for P3. Bound: they differ from the command by less
+/// than the valve may be ahead.
+const VALVE_PARTS: usize = 12;
+
+/// The valve behind its command: the ramp, but no further than P3 has fallen.
+fn valve_parts(
+    (from, to): (f64, f64),
+    ramp: &Ramp,
+    motion: &ActuatorMotion,
+    p3_pa: &FollowedRamp,
+) -> [FollowedRamp; VALVE_PARTS] {
+    let share = |t_s: f64| ramp.share(t_s).min((p3_pa.share(t_s) + Ramps::AHEAD_SHARE).min(1.0));
+    let waits = Ramps::valve_waits(p3_pa.from, p3_pa.to) && from != to;
+    let end_s =
+        if waits { ramp.end_s().max(p3_pa.reaches_s(1.0 - Ramps::AHEAD_SHARE)) } else { ramp.end_s() };
+    let time_s = |part: usize| ramp.start_s + (end_s - ramp.start_s) * part as f64 / VALVE_PARTS as f64;
+    let is_on_the_ramp = (1..=VALVE_PARTS).all(|part| share(time_s(part)) >= ramp.share(time_s(part)));
+    let opening = |part: usize| match part {
+        0 => from,
+        VALVE_PARTS => to,
+        part => from + share(time_s(part)) * (to - from),
+    };
+    std::array::from_fn(|part| {
+        if !waits || is_on_the_ramp {
+            let from = if part + 1 == VALVE_PARTS { from } else { to };
+            return FollowedRamp::new((from, to), ramp, motion);
+        }
+        let start_s = time_s(part);
+        let straight = Ramp { start_s, duration_s: time_s(part + 1) - start_s };
+        FollowedRamp::new((opening(part), opening(part + 1)), &straight, motion)
+    })
 }
 
 impl Inputs for TransitionInputs {
     fn at(&self, t_s: f64) -> BoundaryConditions {
         BoundaryConditions {
             p3_pa: self.p3_pa.value(t_s),
-            valve_opening_ratio: self.valve_ratio.value(t_s),
+            valve_opening_ratio: self
+                .valve_ratio
+                .iter()
+                .rev()
+                .fold(self.to.valve_opening_ratio, |opening, part| opening + (part.value(t_s) - part.to)),
             t3_k: self.t3_k.value(t_s),
             ..self.to
         }
@@ -126,11 +158,11 @@ impl Inputs for TransitionInputs {
     }
 
     fn next_kink_s(&self, t_s: f64) -> f64 {
-        self.channels().map(|channel| channel.next_kink_s(t_s)).into_iter().fold(f64::INFINITY, f64::min)
+        self.channels().map(|channel| channel.next_kink_s(t_s)).fold(f64::INFINITY, f64::min)
     }
 
     fn is_constant_after(&self, t_s: f64) -> bool {
-        self.channels().iter().all(|channel| channel.is_constant_after(t_s))
+        self.channels().all(|channel| channel.is_constant_after(t_s))
     }
 }
 
@@ -145,6 +177,22 @@ struct FollowedRamp {
 }
 
 impl FollowedRamp {
+    fn new((from, to): (f64, f64), ramp: &Ramp, motion: &ActuatorMotion) -> Self {
+        let ramp = Ramp { start_s: ramp.start_s + motion.dead_time_s, ..*ramp };
+        FollowedRamp { from, to, ramp, lag_s: motion.lag_s }
+    }
+
+    /// Share of the change that is complete.
+    fn share(&self, t_s: f64) -> f64 {
+        if self.from == self.to { 1.0 } else { (self.value(t_s) - self.from) / (self.to - self.from) }
+    }
+
+    /// Time at which this share of the change is complete, at the earliest the end of the ramp, s.
+    fn reaches_s(&self, share: f64) -> f64 {
+        let end_s = self.ramp.end_s();
+        end_s + self.lag_s * ((1.0 - self.share(end_s)) / (1.0 - share)).ln().max(0.0)
+    }
+
     fn rest_s(&self) -> f64 {
         self.ramp.end_s() + REST_LAGS * self.lag_s
     }
@@ -209,6 +257,36 @@ mod tests {
             let end_s = (30.0 / step_s).floor() * step_s;
             prop_assert!((followed.value(end_s) - value).abs() < 2e-3, "{} {value}", followed.value(end_s));
         }
+    }
+
+    /// The restraint of the control (runner's `TransitionControl`) on a stand that moves as declared, in small steps: the command follows the
+    /// ramp, but is ahead of P3 by 3 % of the change at most, and the valve follows it with its lag.
+    #[test]
+    fn the_valve_waits_for_a_falling_pressure_as_the_control_makes_it() {
+        let at = |p3_pa: f64, valve_opening_ratio: f64| BoundaryConditions {
+            p3_pa,
+            valve_opening_ratio,
+            ..Default::default()
+        };
+        let (from, to, actuators) = (at(194e3, 2.5), at(164e3, 0.5), RigActuators::SCREW_COMPRESSOR);
+        let ramps = Ramps::overlapping(to.p3_pa - from.p3_pa, -2.0, 0.5, &actuators);
+        let inputs = TransitionInputs::new(&from, &to, &ramps, &actuators);
+        let (step_s, mut opening, mut arrived_s) = (1e-3, 2.5, 0.0);
+        let dead_s = actuators.valve.dead_time_s;
+        for i in 0..60_000 {
+            let middle_s = (f64::from(i) + 0.5) * step_s;
+            let fallen = (from.p3_pa - inputs.at(middle_s - dead_s).p3_pa) / 30e3;
+            let share = ramps.valve.share(middle_s - dead_s).min(fallen + 0.03).min(1.0);
+            opening += step_s / actuators.valve.lag_s * (2.5 - 2.0 * share - opening);
+            let end_s = f64::from(i + 1) * step_s;
+            let off_share = (inputs.at(end_s).valve_opening_ratio - opening).abs() / 2.0;
+            assert!(off_share < Ramps::AHEAD_SHARE, "{end_s} s: {off_share}");
+            arrived_s = if opening > 0.5 + 0.01 * 2.0 { end_s } else { arrived_s };
+        }
+        assert!(inputs.arrival_s(&actuators) >= arrived_s, "{arrived_s} s");
+        // When P3 rises, the valve leads.
+        let rising = TransitionInputs::new(&to, &from, &ramps, &actuators);
+        assert!(rising.valve_ratio[..VALVE_PARTS - 1].iter().all(|part| part.from == part.to));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The transition of a step: the fastest of the candidate ramps that leave no limit of surge margin or speed, and the forecast on them.
 
 use crate::operating_point::forecast::{StepForecast, forecast_step};
-use crate::operating_point::transition::{TransitionInputs, arrival_s, candidate_ramps};
+use crate::operating_point::transition::{TransitionInputs, candidate_ramps};
 use crate::simulation::model::{Model, State};
 use crate::simulation::simulate::SimulationError;
 use crate::simulation::steady::SteadyState;
@@ -113,9 +113,9 @@ fn forecast_on_ramps(
     dwell_s: f64,
     ramps: Ramps,
 ) -> Result<TransitionForecast, SimulationError> {
-    let arrival_s = arrival_s(&ramps, stand.actuators);
-    let dwell_s = extended_dwell_s(dwell_s, arrival_s);
     let inputs = TransitionInputs::new(&from.boundary, &target.boundary, &ramps, stand.actuators);
+    let arrival_s = inputs.arrival_s(stand.actuators);
+    let dwell_s = extended_dwell_s(dwell_s, arrival_s);
     let step = forecast_step(model, state, &inputs, arrival_s, dwell_s, &stand.limits.avoid)?;
     let transition = Transition {
         ramps,

@@ -100,6 +100,18 @@ pub struct ValveMotion {
     pub lag_s: f64,
     /// Play of its drive, opening, >= 0; 0.
     pub play_ratio: f64,
+    /// Share of its commanded motion that it does not make, 0 to 1; 0.
+    pub stuck_ratio: f64,
+}
+
+/// Opening at which a valve that does not follow stands: its nominal area, open in the safe state.
+const STANDS_AT_RATIO: f64 = 1.0;
+
+impl ValveMotion {
+    /// The opening to which a command leads.
+    pub fn reached(&self, command_ratio: f64) -> f64 {
+        command_ratio + self.stuck_ratio * (STANDS_AT_RATIO - command_ratio)
+    }
 }
 
 /// All channels, and the actuators of P3 and of the valve.

@@ -8,100 +8,41 @@ use mapper_diagnose::gap::{Diagnosis, Next, Verdict};
 const WORTH_A_CHECK: f64 = 0.1;
 
 /// What to check for an effect of the library; one without a row gets the check of its part.
-const EFFECTS: [(&str, &str); 33] = [
-    (
-        "actuator_lag",
-        "time a step of the turbine inlet valve: command, position, pressure before the turbine",
-    ),
-    (
-        "area_split",
-        "check the drawing for the metal area before the wheel, and whether T1 is measured close to the housing",
-    ),
-    (
-        "bearing_friction",
-        "check oil pressure, temperature and grade, and the run-down time of the shaft from a fixed speed",
-    ),
-    (
-        "directional_htc",
-        "check the insulation of the compressor housing, and compare a heating with a cooling jump at one point",
-    ),
+const EFFECTS: [(&str, &str); 34] = [
+    ("actuator_lag", "time a step of the turbine inlet valve: command, position, pressure behind it"),
+    ("area_split", "check the metal area before the wheel, and the distance of T1 from the housing"),
+    ("bearing_friction", "check oil pressure, temperature and grade, and the run-down time of the shaft"),
+    ("directional_htc", "check the housing's insulation, and compare heating with cooling at one point"),
     ("efficiency_scale", "check wheel and diffuser for dirt and damage, and the clearance of the wheel"),
-    (
-        "flow_map_scale",
-        "check for leaks between flow meter and compressor, and that the machine is the one of the nominal map",
-    ),
-    (
-        "flowmeter_gain",
-        "compare the flow meter with a second one or with its calibration, and look for leaks behind it",
-    ),
-    (
-        "flowmeter_lag",
-        "check the filter setting of the flow meter, and the volume between it and the compressor",
-    ),
-    (
-        "htc_scale",
-        "check the internal area of the compressor housing that the campaign declares, and oil or dirt on its wall",
-    ),
+    ("flow_map_scale", "look for leaks behind the flow meter, and compare machine and nominal map"),
+    ("flowmeter_gain", "compare the flow meter with a second one, and look for leaks behind it"),
+    ("flowmeter_lag", "check the filter of the flow meter, and the volume to the compressor"),
+    ("htc_scale", "check the declared internal area of the compressor housing, and dirt on its wall"),
     ("humidity", "measure the humidity of the inlet air, and write it as `report.humidity`"),
     ("inlet_htc", "check the diameter of the inlet, and whether its pipe is insulated"),
-    (
-        "inlet_preheat",
-        "insulate the pipe between the T1 probe and the wheel, or move the probe closer to the wheel",
-    ),
-    (
-        "inner_node",
-        "check the depth of the Tc probe in the wall; a probe close to the gas side shows the temperature that counts",
-    ),
+    ("inlet_preheat", "insulate the pipe between the T1 probe and the wheel, or shorten it"),
+    ("inner_node", "check the depth of the Tc probe: close to the gas it shows what counts"),
     ("oil_scale", "check flow, temperature and grade of the oil"),
     ("p2_offset", "compare the P2 transducer with the barometer while the machine is at rest"),
     ("recirculation", "check shroud bleed, recirculation valve and seals behind the wheel for leaks"),
-    (
-        "recovery",
-        "check type and direction of the T2 probe; a shielded probe recovers the kinetic energy of the gas",
-    ),
-    (
-        "sheathed_probe",
-        "check sheath diameter and installation of the T2 probe; a bare thin probe follows faster",
-    ),
-    (
-        "stem_conduction",
-        "check immersion depth of the T2 probe and the insulation of its stem and of the pipe there",
-    ),
+    ("recovery", "check type and direction of the T2 probe; a shielded one recovers kinetic energy"),
+    ("sheathed_probe", "check sheath and place of the T2 probe; a bare thin one follows faster"),
+    ("stem_conduction", "check immersion depth of the T2 probe, and insulation of stem and pipe"),
     ("t1_offset", "compare the T1 probe with the others after a soak, and check its connector"),
     ("t2_offset", "compare the T2 probe with the others after a soak, and check its connector"),
-    (
-        "tc_offset",
-        "compare the Tc probe with the others after a soak, and check its contact with the housing",
-    ),
+    ("tc_offset", "compare the Tc probe with the others after a soak, and check its contact"),
     ("tip_diameter", "check the diameter of the T2 probe, and deposits on it"),
     ("turbine_efficiency", "check turbine wheel and vanes for damage, and the clearance of the wheel"),
     ("turbine_radiation", "put a heat shield between turbine and compressor housing, and repeat one jump"),
-    (
-        "slow_valve",
-        "time a step of the back-pressure valve: command and position, and its supply of air or current",
-    ),
-    (
-        "valve_area",
-        "check the zero of the back-pressure valve, its position feedback and leaks behind the compressor",
-    ),
-    (
-        "valve_play",
-        "approach one opening of the back-pressure valve from both sides, and compare flow and position",
-    ),
+    ("slow_valve", "time a step of the back-pressure valve: command, position, its supply"),
+    ("valve_area", "check zero and position of the back-pressure valve, and leaks before it"),
+    ("valve_play", "approach a valve opening from both sides, and compare flow and position"),
+    ("valve_stuck", "check the linkage of the back-pressure valve: position against command"),
     ("ventilation", "check fans, cell ventilation and the insulation of the housings"),
-    (
-        "t1_towards_wall",
-        "check immersion depth of the T1 probe, its distance from the housing, and the insulation of its stem",
-    ),
-    (
-        "turbine_capacity",
-        "check turbine vanes and volute for deposits and damage, and the turbine flow meter",
-    ),
+    ("t1_towards_wall", "check depth and stem of the T1 probe, and its distance from the housing"),
+    ("turbine_capacity", "check turbine vanes, volute and flow meter for deposits and damage"),
     ("turbine_leak", "check the waste gate and the seals around the turbine wheel for leaks"),
-    (
-        "turbine_flow_gain",
-        "compare the turbine flow meter with a second one, and look for leaks before the turbine",
-    ),
+    ("turbine_flow_gain", "compare the turbine flow meter with a second one, and look for leaks"),
 ];
 
 /// Checks for a cause outside the library, by the part of the machine where it acts.
@@ -109,40 +50,22 @@ const PLACES: [(&str, &str); 19] = [
     ("actuator", "check the turbine inlet valve and its controller: setpoint, position, pressure"),
     ("turbine_flow", "check for leaks before the turbine, its vanes and the turbine flow meter"),
     ("shaft", "check the oil supply, the bearings, and whether another power is taken from the shaft"),
-    (
-        "compressor_flow",
-        "check for leaks, recirculation and dirt in the compressor, and that the nominal map is of this machine",
-    ),
+    ("compressor_flow", "look for leaks, recirculation and dirt, and check the nominal map"),
     ("flow_meter", "check range, filter setting and calibration of the flow meter"),
     ("outlet", "check the back-pressure valve and the volume and leaks behind the compressor"),
-    (
-        "compressor_gas",
-        "check whether gas is heated or cooled between the T1 and the T2 probe: cooler, injection, recirculation",
-    ),
+    ("compressor_gas", "look for heat to the gas between T1 and T2: cooler, injection, leaks"),
     ("t1_probe", "check the T1 probe: calibration, connector, place"),
     ("t2_probe", "check the T2 probe: calibration, immersion depth, insulation, deposits"),
     ("tc_probe", "check the Tc probe: calibration, depth, contact with the housing"),
     ("p2_sensor", "check the P2 transducer: calibration, range, pulse line"),
     ("p1_sensor", "check the P1 tap and transducer: calibration, and whether the tap sees dynamic pressure"),
-    (
-        "p3_sensor",
-        "check the P3 tap and transducer: calibration, pulse line, and whether the tap sees dynamic pressure",
-    ),
-    (
-        "t3_probe",
-        "check the T3 probe: calibration, radiation to the wall, and whether the gas is mixed there",
-    ),
+    ("p3_sensor", "check the P3 tap and transducer: calibration, pulse line, dynamic pressure"),
+    ("t3_probe", "check the T3 probe: calibration, radiation to the wall, mixing of the gas"),
     ("p4_sensor", "check the P4 tap and transducer: calibration, and whether the tap sees dynamic pressure"),
     ("oil_probe", "check the probe of the oil supply: calibration, immersion depth"),
     ("speed_sensor", "check the number of pulses per revolution that the speed sensor assumes"),
-    (
-        "compressor_housing",
-        "check whether coolant or oil runs through the compressor housing, and its insulation",
-    ),
-    (
-        "turbine_housing",
-        "check whether coolant runs through the bearing or turbine housing, the oil, and the insulation",
-    ),
+    ("compressor_housing", "look for coolant or oil in the housing, and check its insulation"),
+    ("turbine_housing", "look for coolant in bearing or turbine housing; check oil, insulation"),
 ];
 
 fn find_action(table: &[(&str, &'static str)], name: &str) -> Option<&'static str> {

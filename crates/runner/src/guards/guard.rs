@@ -12,6 +12,8 @@ pub struct CommandedState {
     pub step_since_s: Option<f64>,
     /// Target of the current step.
     pub aim: Option<OperatingPoint>,
+    /// Commanded opening of the valve, and the time of its last change, s.
+    pub valve: Option<(f64, f64)>,
     /// Time of the last jump of P3 or the valve, s.
     pub jumped_s: Option<f64>,
 }

@@ -220,7 +220,8 @@ mod tests {
     #[test]
     fn a_reported_trip_and_a_stopped_shaft_trip_once_and_latch() {
         let aim = Some(OperatingPoint { speed_rpm: 1e5, valve_opening_ratio: 0.7 });
-        let state = CommandedState { running: true, step_since_s: Some(0.0), aim, jumped_s: None };
+        let state =
+            CommandedState { running: true, step_since_s: Some(0.0), aim, ..CommandedState::default() };
         let speeds = |from_s: f64, rpm: f64| {
             let t_s: Vec<f64> = (0..100).map(|i| from_s + 0.1 * f64::from(i)).collect();
             let values = vec![rpm; 100];

@@ -174,6 +174,7 @@ impl Run<'_, '_> {
             }
         }
         while let Some(step) = next {
+            self.rest_before(&step)?;
             self.step(&step)?;
             next = self.next_step()?;
             self.pass_notes()?;
@@ -346,6 +347,9 @@ impl Run<'_, '_> {
         } else if !running {
             self.commanded.jumped_s = None;
         }
+        let opening_ratio = setpoints.valve_opening_ratio;
+        let known = self.commanded.valve.filter(|(before_ratio, _)| *before_ratio == opening_ratio);
+        self.commanded.valve = known.or(Some((opening_ratio, self.now_s)));
         (self.commanded.running, self.sent) = (running, Some(setpoints));
         Ok(())
     }
@@ -362,6 +366,25 @@ impl Run<'_, '_> {
         let message = format!("guard `{}`: {}; {response}", trip.guard, trip.reason);
         let t_s = trip.t_s.max(self.now_s);
         Ok(self.runner.observer.on_event(&Event { t_s, kind: EventKind::GuardActed, message })?)
+    }
+
+    /// Switches the air off before a step that a standstill precedes.
+    fn rest_before(&mut self, step: &PlanStep) -> Result<(), Halt> {
+        let duration_s = self.runner.steps.rest_s();
+        if duration_s > 0.0 {
+            self.unload()?;
+            let oil_temperature_k = step.oil_temperature_k;
+            let soak = Soak {
+                duration_s,
+                until_settled: false,
+                oil_temperature_k,
+                temperature_sigma_k: 0.0,
+                pressure_sigma_pa: 0.0,
+            };
+            self.soak(step, soak)?;
+            (self.at, self.commanded.valve) = (None, None);
+        }
+        Ok(())
     }
 
     /// Keeps the machine at rest for the duration of the soak; events mark start and end.

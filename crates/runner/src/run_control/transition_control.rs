@@ -25,12 +25,8 @@ pub struct StandMotion {
 
 /// Time constant of a shaft for ramps without a plan, s. Judgement: turbochargers of passenger cars take half a second to two.
 const USUAL_SHAFT_S: f64 = 1.5;
-/// Share of a change by which a follower may be ahead of the measured leader: the leader need not arrive exactly. Judgement.
-const AHEAD_SHARE: f64 = 0.03;
 /// Change of the speed, relative, above which the valve waits for the shaft. Judgement: below, the reading is not clearly above its noise.
 const MIN_SPEED_CHANGE_RATIO: f64 = 0.03;
-/// Change of P3, relative, above which the valve waits for it. Judgement: as above.
-const MIN_P3_CHANGE_RATIO: f64 = 0.02;
 /// Share of the allowed overshoot at which P3 stops rising. Judgement: the other half is for the delay of the shaft.
 const HOLD_OVERSHOOT_SHARE: f64 = 0.25;
 /// Distance from the limit of speed at which P3 stops rising, relative. Judgement: twice the change of a fast shaft in one interval.
@@ -220,7 +216,7 @@ impl TransitionControl {
     fn advance_valve(&mut self, step_s: f64) {
         let since_s = self.now_s - self.start_s;
         let planned = self.ramps.valve.share(since_s);
-        let allowed = if since_s > MAX_WAIT_S { 1.0 } else { self.leader_share() + AHEAD_SHARE };
+        let allowed = if since_s > MAX_WAIT_S { 1.0 } else { self.leader_share() + Ramps::AHEAD_SHARE };
         // After a wait the valve goes on at the rate of its ramp.
         let most = match self.ramps.valve.duration_s > 0.0 {
             true => self.valve_share + step_s / self.ramps.valve.duration_s,
@@ -231,7 +227,7 @@ impl TransitionControl {
 
     /// Share that P3 and shaft have really completed, if they lead; otherwise 1.
     fn leader_share(&self) -> f64 {
-        if self.to.p3_pa >= self.from.p3_pa * (1.0 - MIN_P3_CHANGE_RATIO) || self.leader_rests {
+        if !Ramps::valve_waits(self.from.p3_pa, self.to.p3_pa) || self.leader_rests {
             return 1.0;
         }
         // From the readings at the start, which need not be at the last commands.
@@ -383,7 +379,7 @@ mod tests {
             let t_s = 0.1 * f64::from(tick);
             let sent = control.advance(&batch(t_s, p3_pa, 150e3), t_s, true);
             let (fallen, opened) = ((300e3 - p3_pa) / 170e3, (sent.valve_opening_ratio - 0.5) / 2.0);
-            assert!(opened <= fallen + AHEAD_SHARE + 1e-9, "{t_s} s: {opened} of {fallen}");
+            assert!(opened <= fallen + Ramps::AHEAD_SHARE + 1e-9, "{t_s} s: {opened} of {fallen}");
             if control.is_complete() {
                 complete_s = complete_s.min(t_s);
             }

@@ -61,6 +61,7 @@ fn default_guards() -> GuardSet {
             dwell_s: 5.0,
             reaction: Reaction::Safe,
         }),
+        valve: None,
         speed: Some(SpeedBand { band_ratio: 0.05, reaction: Reaction::Safe }),
         // Without noise, a flow of zero is constant.
         frozen_flow: None,

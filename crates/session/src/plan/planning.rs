@@ -9,12 +9,13 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
 use mapper_core::{
     Channel, IdentifiedPoint, Method, OperatingPoint, Plan, PlanInputHashes, PlanRemark, PlanStep, Predicted,
-    Recording, RigDescription, SampleBatch, SetpointRanges, StepMarker, step_number,
+    Recording, RigDescription, SampleBatch, Series, SetpointRanges, StepMarker, step_number,
 };
 use mapper_identify::{
     IdentifyConfig, PressureTap, ZeroSettings, expected, expected_after_zero, expected_steady,
     expected_together, identify_each,
 };
+use mapper_numerics::statistics::{mean, standard_deviation};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::reach::hold_speed;
 use mapper_physics::simulation::model::Model;
@@ -364,6 +365,7 @@ pub(crate) struct ScriptedSteps {
     /// The last two steps with their samples. Identification of the last step needs only these.
     recent: Recording,
     current_step: Option<PlanStep>,
+    rest_s: f64,
     settling: Option<SettleWatch>,
     pub(crate) finished: Option<StepResult>,
     /// Ended steps with their actual times.
@@ -388,6 +390,7 @@ impl ScriptedSteps {
             cool_down_s: campaign.timing.cool_down_s,
             recent: Recording::default(),
             current_step: None,
+            rest_s: 0.0,
             settling: None,
             finished: None,
             done: Vec::new(),
@@ -421,8 +424,13 @@ impl StepSource for ScriptedSteps {
             EndCondition::Dwell => None,
             EndCondition::UntilSettled(rule) => Some(SettleWatch::new(rule, next.step.start_s)),
         };
+        self.rest_s = next.rest_s;
         self.current_step = Some(next.step.clone());
         Ok(Some(next.step))
+    }
+
+    fn rest_s(&self) -> f64 {
+        self.rest_s
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> bool {
@@ -434,7 +442,8 @@ impl StepSource for ScriptedSteps {
         let Some(mut step) = self.current_step.take() else { return Ok(()) };
         retain_last_two_steps(&mut self.recent, marker);
         let identified = identify_each(&self.recent, &self.config).map_err(StepSourceError::new)?.pop();
-        self.finished = Some(result_of(&step, marker, identified.and_then(Result::ok)));
+        let readings = readings(&self.recent, marker);
+        self.finished = Some(result_of(&step, marker, identified.and_then(Result::ok), readings));
         (step.start_s, step.dwell_s) = (marker.start_s, marker.end_s - marker.start_s);
         step.predicted.minutes = step.dwell_s / 60.0;
         self.done.push(step);
@@ -443,7 +452,7 @@ impl StepSource for ScriptedSteps {
 
     fn after_skipped_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let Some(step) = self.current_step.take() else { return Ok(()) };
-        self.finished = Some(result_of(&step, marker, None));
+        self.finished = Some(result_of(&step, marker, None, readings(&self.recent, marker)));
         Ok(())
     }
 
@@ -452,7 +461,28 @@ impl StepSource for ScriptedSteps {
     }
 }
 
-fn result_of(step: &PlanStep, marker: &StepMarker, identified: Option<IdentifiedPoint>) -> StepResult {
+/// Mean and variance of each channel over the second half of a step.
+fn readings(recording: &Recording, marker: &StepMarker) -> BTreeMap<Channel, (f64, f64)> {
+    let middle_s = 0.5 * (marker.start_s + marker.end_s);
+    let of_channel = |(channel, series): (&Channel, &Series)| {
+        let values: Vec<f64> = series
+            .slice(middle_s, marker.end_s)
+            .1
+            .iter()
+            .copied()
+            .filter(|value| value.is_finite())
+            .collect();
+        Some((*channel, (mean(&values)?, standard_deviation(&values)?.powi(2))))
+    };
+    recording.series.iter().filter_map(of_channel).collect()
+}
+
+fn result_of(
+    step: &PlanStep,
+    marker: &StepMarker,
+    identified: Option<IdentifiedPoint>,
+    readings: BTreeMap<Channel, (f64, f64)>,
+) -> StepResult {
     StepResult {
         number: step_number(step.index),
         target: step.to,
@@ -460,6 +490,7 @@ fn result_of(step: &PlanStep, marker: &StepMarker, identified: Option<Identified
         start_s: marker.start_s,
         end_s: marker.end_s,
         identified,
+        readings,
     }
 }
 

@@ -56,6 +56,7 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         humidity_sigma_kg_kg: campaign.report.humidity_sigma_kg_kg(&campaign.boundary),
         reference: campaign.reference,
         valve_play_ratio: campaign.rig_actuators().valve_play_ratio,
+        opening_is_area: true,
         barometer_pa: campaign.report.barometer_pa,
         housing_contact_sigma_ratio: campaign
             .sensors
@@ -152,6 +153,7 @@ pub fn identification_with(campaign: &Campaign, map: &ChannelMap) -> IdentifyCon
     let identification = identification(campaign);
     let config = IdentifyConfig {
         declared: declared(campaign, map),
+        opening_is_area: *map == ChannelMap::native(),
         noise_colour: map.noise_colour.unwrap_or(identification.noise_colour),
         window: map.window.map_or(identification.window, |window| WindowRule::Fixed {
             start_s: window.start_s,

@@ -1,17 +1,24 @@
 //! Drives a rig, with the guards that it lacks.
 
 use crate::SessionError;
+use crate::recording::identification_config::identification;
 use mapper_campaign::{Campaign, DEFAULT_MAX_AGE_S};
-use mapper_core::{Backend, Channel, Clock, GuardName, PlanStep, RigDescription, RunEnding, UnpacedClock};
+use mapper_core::{
+    Backend, Channel, Clock, GuardName, PlanStep, Reaction, RigDescription, RunEnding, SampleBatch, Trip,
+    UnpacedClock, is_reading,
+};
+use mapper_identify::{ValveCheck, ValveState};
+use mapper_numerics::statistics::median;
 use mapper_physics::laws::thermocouple;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::settled::speed_response;
 use mapper_physics::simulation::model::Model;
 use mapper_runner::{
-    AvoidedSpeedWatch, BatchWatch, Guard, Operator, Protection, REQUIRED_CHANNELS, ReadingBounds, RigWatch,
-    RunError, RunObserver, Runner, SignalWatch, SilenceWatch, SoakSource, SpeedControl, SpeedControlLimits,
-    StandMotion, StartCheck, StepSource, SurgeWatch, UnguardedChannel,
+    AvoidedSpeedWatch, BatchWatch, CommandedState, Guard, Operator, Protection, REQUIRED_CHANNELS,
+    ReadingBounds, RigWatch, RunError, RunObserver, Runner, SignalWatch, SilenceWatch, SoakSource,
+    SpeedControl, SpeedControlLimits, StandMotion, StartCheck, StepSource, SurgeWatch, UnguardedChannel,
 };
+use std::collections::VecDeque;
 use std::sync::atomic::AtomicBool;
 
 /// Runs the steps on the rig, after the soak if the campaign has one; `model`, the nominal machine, tunes the speed loop.
@@ -63,7 +70,8 @@ pub fn drive_paced(
     pace: Pace<'_>,
 ) -> Result<RunEnding, RunError> {
     let rig = backend.describe();
-    let guards = make_guards(campaign, &rig, pace.auxiliary_channels);
+    let mut guards = make_guards(campaign, &rig, pace.auxiliary_channels);
+    guards.extend(valve_watch(campaign, model, &rig));
     let mut with_soak;
     let steps: &mut dyn StepSource = match campaign.zero {
         None => steps,
@@ -209,6 +217,13 @@ pub fn make_guards(
     guards
 }
 
+/// The guard of the valve, if the rig drives it.
+fn valve_watch(campaign: &Campaign, model: &Model, rig: &RigDescription) -> Option<Box<dyn Guard>> {
+    let reaction = campaign.guard_set().valve.filter(|_| rig.controls)?;
+    let check = ValveCheck::new(identification(campaign), model.clone(), campaign.tolerances);
+    Some(Box::new(ValveWatch::new(check, reaction, campaign.rig_actuators().valve.follow_s())))
+}
+
 /// Number of samples that a source may miss before it counts as silent.
 const MAX_MISSED_SAMPLES: f64 = 3.0;
 
@@ -241,4 +256,100 @@ pub fn check_guards(campaign: &Campaign, rig: &RigDescription) -> Result<(), Ses
         backend: rig.backend.clone(),
         channels: without_channel.join(", "),
     })
+}
+
+/// Time over which the readings are judged, s. Judgement: twenty samples at 10 Hz, and short enough to name a valve within seconds.
+const JUDGED_S: f64 = 2.0;
+/// Time for the plenum and the sensors to follow the valve, s. Judgement: ten times the filling time of a usual plenum.
+const SENSORS_S: f64 = 1.0;
+/// Largest number of samples that are kept. Bound: the memory; a rig at 1 kHz fills it in two seconds.
+const MAX_SAMPLES: usize = 2000;
+
+type Row = [f64; ValveCheck::CHANNELS.len()];
+
+/// Judges the valve once after each of its commands, when it has had its declared time.
+struct ValveWatch {
+    check: ValveCheck,
+    reaction: Reaction,
+    /// Time after a command until the valve is judged first, s.
+    wait_s: f64,
+    recent: VecDeque<(f64, Row)>,
+    /// Time of the command that was judged last, s.
+    judged_s: Option<f64>,
+    /// Whether the valve stood still then.
+    stands_still: bool,
+}
+
+impl ValveWatch {
+    /// `follow_s`: declared time in which the valve follows the end of a command.
+    fn new(check: ValveCheck, reaction: Reaction, follow_s: f64) -> Self {
+        ValveWatch {
+            check,
+            reaction,
+            wait_s: follow_s + SENSORS_S + JUDGED_S,
+            recent: VecDeque::new(),
+            judged_s: None,
+            stands_still: false,
+        }
+    }
+
+    fn add(&mut self, batch: &SampleBatch) {
+        let columns = ValveCheck::CHANNELS.map(|channel| (channel, batch.column(channel)));
+        for (index, t_s) in batch.t_s.iter().enumerate() {
+            let reading = |(channel, column): (Channel, Option<&[f64]>)| {
+                let value = column.and_then(|values| values.get(index)).copied();
+                value.filter(|value| is_reading(channel, *value)).unwrap_or(f64::NAN)
+            };
+            self.recent.push_back((*t_s, columns.map(reading)));
+        }
+        let Some((last_s, _)) = self.recent.back().copied() else { return };
+        while self
+            .recent
+            .front()
+            .is_some_and(|(t_s, _)| *t_s < last_s - JUDGED_S || self.recent.len() > MAX_SAMPLES)
+        {
+            self.recent.pop_front();
+        }
+    }
+
+    /// Medians of the earlier or the later half of the readings.
+    fn half(&self, is_later: bool) -> Row {
+        let (first, last) = (self.recent.front(), self.recent.back());
+        let middle_s = first.zip(last).map_or(0.0, |((first_s, _), (last_s, _))| 0.5 * (first_s + last_s));
+        std::array::from_fn(|channel| {
+            let rows = self.recent.iter().filter(|(t_s, _)| (*t_s > middle_s) == is_later);
+            median(rows.map(|(_, row)| row[channel]).filter(|value| value.is_finite())).unwrap_or(f64::NAN)
+        })
+    }
+}
+
+impl Guard for ValveWatch {
+    fn check(&mut self, batch: &SampleBatch, now_s: f64, state: &CommandedState) -> Option<Trip> {
+        self.add(batch);
+        let (command_ratio, since_s) = state.valve.filter(|_| state.running)?;
+        if self.judged_s == Some(since_s) || now_s < since_s + self.wait_s {
+            return None;
+        }
+        let size = (self.recent.len() / 2, 0.5 * JUDGED_S);
+        let opening_ratio =
+            match self.check.judge(command_ratio, [false, true].map(|is_later| self.half(is_later)), size) {
+                ValveState::Unknown => return None,
+                ValveState::Follows => None,
+                ValveState::StandsStill { opening_ratio } => Some(opening_ratio),
+            };
+        self.judged_s = Some(since_s);
+        let stood_still = std::mem::replace(&mut self.stands_still, opening_ratio.is_some());
+        opening_ratio.filter(|_| !stood_still).map(|opening_ratio| Trip {
+            t_s: now_s,
+            guard: GuardName::Valve,
+            reaction: self.reaction,
+            reason: format!(
+                "the back-pressure valve does not follow: {:.0} % of its area commanded {:.0} s ago, flow and pressures are those of {:.0} %; \
+                 check its positioner",
+                100.0 * command_ratio,
+                now_s - since_s,
+                100.0 * opening_ratio
+            ),
+        })
+    }
 }

@@ -111,6 +111,13 @@ impl RunObserver for Driven {
 
 /// Drives a campaign on its lab from the first step to the last.
 pub fn driven(campaign: &Campaign) -> Driven {
+    let (driven, end) = driven_to_the_end(campaign);
+    assert_eq!(end, RunEnding::Completed);
+    driven
+}
+
+/// Drives a campaign on its lab until the run ends.
+pub fn driven_to_the_end(campaign: &Campaign) -> (Driven, RunEnding) {
     let registry = Registry {
         backends: vec![mapper_backends::virtual_lab::PLUGIN],
         effects: mapper_effects::catalogue(),
@@ -123,6 +130,5 @@ pub fn driven(campaign: &Campaign) -> Driven {
     let mut steps = PlanSteps::new(&plan);
     let end =
         drive(campaign, &model, &mut steps, backend.as_mut(), &mut seen, &AtomicBool::new(false)).unwrap();
-    assert_eq!(end, RunEnding::Completed);
-    seen
+    (seen, end)
 }

@@ -172,11 +172,12 @@ impl Backend for VirtualLab {
             RigMode::Running => setpoints.p3_pa,
             RigMode::Standstill => armed.inputs.cell.p4_pa * MIN_EXPANSION_RATIO,
         };
+        let opening_ratio = settings.instruments.valve.reached(setpoints.valve_opening_ratio);
         let is_first = armed.machine.is_none();
         for (actuator, command) in [
             (&mut armed.inputs.p3, p3_pa),
             (&mut armed.inputs.t3, setpoints.t3_k),
-            (&mut armed.inputs.valve, setpoints.valve_opening_ratio),
+            (&mut armed.inputs.valve, opening_ratio),
             (&mut armed.inputs.oil, setpoints.oil_temperature_k),
         ] {
             actuator.set(now_s, command);
@@ -185,7 +186,7 @@ impl Backend for VirtualLab {
             // The rig starts in the steady state of its first setpoints.
             armed.inputs.p3 = Actuator::at_rest(settings.p3_actuator, p3_pa);
             armed.inputs.t3 = Actuator::at_rest(settings.t3_actuator, setpoints.t3_k);
-            armed.inputs.valve = Actuator::at_rest(settings.valve_actuator, setpoints.valve_opening_ratio);
+            armed.inputs.valve = Actuator::at_rest(settings.valve_actuator, opening_ratio);
             armed.inputs.oil = Actuator::at_rest(settings.oil_actuator, setpoints.oil_temperature_k);
             armed.machine = Some(settle(settings, armed, now_s)?);
         } else if let Some(Machine::Running(simulator)) = armed.machine.as_mut() {

@@ -30,7 +30,7 @@ struct SettingsFile {
     /// Samples per second; default 10 Hz.
     sample_rate: Option<Quantity<Frequency>>,
     /// `standstill` (cold, the default) or `settled` (in steady state at the first setpoints).
-    start: StartName,
+    start: Start,
     /// `declared` (the default) or `none`.
     noise: NoiseName,
     /// `drawn` from the declared uncertainty (the default), or `none`.
@@ -74,44 +74,24 @@ struct PrecursorFile {
     growth: Option<f64>,
 }
 
-#[derive(Debug, Clone, Copy, Default, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum StartName {
-    #[default]
-    Standstill,
-    Settled,
+/// Declares keys of two values, the default first.
+macro_rules! choices {
+    ($($name:ident $usual:ident $other:ident,)*) => {$(
+        #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        enum $name {
+            #[default]
+            $usual,
+            $other,
+        }
+    )*};
 }
 
-#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum NoiseName {
-    #[default]
-    Declared,
-    None,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum OffsetsName {
-    #[default]
-    Drawn,
-    None,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum WeatherName {
-    #[default]
-    Calm,
-    Wandering,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum TolerancesName {
-    Drawn,
-    #[default]
-    None,
+choices! {
+    NoiseName Declared None,
+    OffsetsName Drawn None,
+    WeatherName Calm Wandering,
+    TolerancesName None Drawn,
 }
 
 /// Deviations of the machine, as found by a diagnosis.
@@ -231,10 +211,7 @@ pub fn read_settings(
         cell: nominal.boundary,
         rig: file.rig.clone(),
         sample_rate_hz,
-        start: match file.start {
-            StartName::Standstill => Start::Standstill,
-            StartName::Settled => Start::Settled,
-        },
+        start: file.start,
         p3_actuator: actuators.turbine_inlet_pressure.dynamics("turbine_inlet_pressure", &declared.p3)?,
         t3_actuator: actuators
             .turbine_inlet_temperature
@@ -386,9 +363,11 @@ fn rate_unit<Rate: Dimension>() -> &'static str {
 }
 
 /// State of the machine when the lab is armed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Start {
     /// At rest and at ambient temperature.
+    #[default]
     Standstill,
     /// Settled at the first setpoints.
     Settled,

@@ -42,6 +42,9 @@ pub(crate) struct GuardsFile {
     /// The target speed of a step.
     #[serde(default)]
     speed: SpeedFile,
+    /// The flow through the back-pressure valve against its command.
+    #[serde(default)]
+    valve: ValveFile,
     /// Settings of every guarded signal.
     #[serde(default)]
     signals: SignalsFile,
@@ -146,6 +149,15 @@ element! {
         /// Reaction; `safe` if none is given.
         reaction => reaction: Reaction [example = &"safe"];
     }
+}
+
+/// The guard over a back-pressure valve that does not follow its commands.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct ValveFile {
+    /// Reaction; `note` if none is given.
+    #[schemars(example = &"safe")]
+    reaction: Option<Reaction>,
 }
 
 /// Settings of every guarded signal.
@@ -265,6 +277,7 @@ impl GuardsFile {
             signals,
             surge: Some(surge),
             speed: Some(speed),
+            valve: Some(self.valve.reaction.unwrap_or(Reaction::Note)),
             frozen_flow: frozen(Channel::CompressorFlow),
         }
     }

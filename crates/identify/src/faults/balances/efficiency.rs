@@ -4,8 +4,9 @@
 //! The effect of a constant error is proportional to one over the rise, so it bends the map. The effect of an error that grows over the run
 //! does not depend on the map position.
 
-use crate::faults::balance_rows::{Machine, Rows, common, errors, own};
+use crate::faults::balance_rows::{Rows, common, errors, own};
 use crate::faults::end_readings::{ANY_ROUGHNESS, At, CHANNELS, PerChannel, Readings, Smooth};
+use crate::faults::found_fault::Machine;
 use crate::faults::nominal_rig::{NominalRig, Places, is_on_a_map};
 use crate::single_step::fit::ETA_BOUNDS;
 use mapper_core::{Channel, FaultKind, ReferenceState};

@@ -12,9 +12,10 @@
 //! uncertainty.
 
 use crate::IdentifyConfig;
-use crate::faults::balance_rows::{Machine, Rows, common, own};
+use crate::faults::balance_rows::{Rows, common, own};
 use crate::faults::balances::efficiency::{FittedEfficiencies, compressed};
 use crate::faults::end_readings::{CHANNELS, MAX_CORRELATED_ROWS, PerChannel, Readings, span_s};
+use crate::faults::found_fault::Machine;
 use crate::faults::nominal_rig::NominalRig;
 use crate::single_step::fit::ETA_BOUNDS;
 use crate::step_data::samples::{Row, Samples, slope_per_s};

@@ -3,3 +3,4 @@
 pub(crate) mod efficiency;
 pub(crate) mod housing;
 pub(crate) mod standstill;
+pub(crate) mod valve;

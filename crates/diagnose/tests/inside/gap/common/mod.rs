@@ -99,7 +99,8 @@ fn recorded(
         })
         .collect();
     // The valve came to its opening by closing.
-    let valve_opening_ratio = boundary().valve_opening_ratio + 0.5 * rig.instruments.valve.play_ratio;
+    let valve = rig.instruments.valve;
+    let valve_opening_ratio = valve.reached(boundary().valve_opening_ratio) + 0.5 * valve.play_ratio;
     let with_play = BoundaryConditions { valve_opening_ratio, ..boundary() };
     let rows = lagged.iter().map(|p3_pa| BoundaryConditions { p3_pa: *p3_pa, ..with_play }).collect();
     let inputs = InterpolatedInputs::new(fine_s, rows).unwrap();

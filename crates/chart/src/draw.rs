@@ -293,7 +293,6 @@ fn draw_contours(
     }
 }
 
-/// Draws the labels; called last, because they avoid everything else.
 fn draw_point_labels(drawing: &mut Drawing, placed: &PlacedPanel<'_>, late: &mut Vec<LateText>) {
     let texts = late.iter().map(|text| text_box(text.at, &text.text, &text.style)).collect();
     let mut surroundings = Surroundings::of(&placed.frame, &placed.panel.items, texts);

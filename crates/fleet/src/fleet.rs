@@ -64,7 +64,6 @@ impl Fleet {
         self.parts().join(part_name(hash))
     }
 
-    /// File that marks the item as in progress; contains the name of the worker.
     pub(crate) fn progress_marker(&self, hash: &Hash) -> PathBuf {
         self.directory.join(BEGUN).join(hash.to_string())
     }
@@ -158,7 +157,6 @@ pub trait Kind: Sync {
     /// A one-line description.
     fn summary(&self) -> &'static str;
 
-    /// The items of a study.
     fn items(&self, study: &StudyFile) -> Result<StudyDraft, FleetError>;
 
     /// Processes one item and returns JSON. Equal payloads give equal results on any computer.

@@ -311,7 +311,6 @@ pub(crate) fn shell_quote(text: &str) -> String {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct QueueJobs {
-    /// ID of the array job.
     pub work: String,
     /// ID of the merge job; or, if the queue refused it after it had accepted the array, its answer.
     pub merge: Result<Option<String>, String>,

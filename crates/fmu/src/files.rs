@@ -182,7 +182,6 @@ pub fn number(name: &str, value: f64) -> Result<String, FmuError> {
     }
 }
 
-/// The numbers of an array, comma-separated.
 pub fn numbers(name: &str, values: impl IntoIterator<Item = f64>) -> Result<String, FmuError> {
     Ok(values.into_iter().map(|value| number(name, value)).collect::<Result<Vec<_>, _>>()?.join(", "))
 }
@@ -254,7 +253,6 @@ fn constants(text: &mut String, reference: ReferenceState) -> Result<(), FmuErro
     Ok(())
 }
 
-/// The gases of both sides, and the vapour that `compressor.humidity` adds.
 fn gases(text: &mut String, params: &Params) -> Result<(), FmuError> {
     text.push_str(
         "typedef struct {\n    double constant, cp[7];\n    int is_real;\n    double virial[5], virial_with_vapour[5];\n} Gas;\n",

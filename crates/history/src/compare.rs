@@ -220,7 +220,6 @@ fn conclusions(
     sentences
 }
 
-/// Inputs of the runs that changed since the last night, as sentences.
 fn changed_inputs(night: &Night, earlier: &BTreeMap<RunKey, Vec<RunRow>>) -> Vec<String> {
     let mut campaigns = BTreeSet::new();
     let mut models = BTreeSet::new();

@@ -28,7 +28,6 @@ pub(crate) struct State {
     campaign: String,
     pub(crate) units: DisplayUnits,
     pub(crate) lines: Vec<String>,
-    /// Expected points on the map.
     planned: Vec<Planned>,
     steps: usize,
     duration_s: f64,
@@ -194,7 +193,6 @@ impl Feed {
         }
     }
 
-    /// The complete state.
     pub(crate) fn snapshot(&self) -> Arc<str> {
         let Ok(mut current) = self.current.lock() else { return Arc::from("{}") };
         self.update_operator_flags(&mut current.state);

@@ -158,7 +158,6 @@ struct OpenConnection {
     brief: Option<TcpStream>,
 }
 
-/// A connection, removed from the list when dropped.
 #[derive(Debug)]
 pub(crate) struct Connection {
     all: Arc<Connections>,
@@ -243,7 +242,6 @@ impl Hub {
         Some(receive)
     }
 
-    /// Sends a message; browsers that have gone or fall behind are removed.
     pub(crate) fn publish(&self, message: &Arc<str>) {
         if let Ok(mut clients) = self.clients.lock() {
             clients.retain(|(_, client)| client.try_send(message.clone()).is_ok());

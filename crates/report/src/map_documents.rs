@@ -54,7 +54,6 @@ fn add_verdicts(document: &mut Document, map: &CompressorMap) {
     }
 }
 
-/// Adds the columns of a table with their ranges in `units`, if there are any.
 fn add_columns(document: &mut Document, columns: &[ImportedColumn], units: &str) {
     let row = |column: &ImportedColumn| {
         [

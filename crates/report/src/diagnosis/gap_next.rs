@@ -11,7 +11,6 @@ use mapper_numerics::statistics::{mean, rms};
 /// 0 degC, K.
 const ZERO_C_K: f64 = 273.15;
 
-/// The next experiment and its alternatives; empty if nothing remains to be decided.
 pub(crate) fn next_section(diagnosis: &Diagnosis) -> Document {
     let mut document = Document::default();
     let Some(next) = &diagnosis.next else { return document };

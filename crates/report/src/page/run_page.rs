@@ -103,7 +103,6 @@ fn footer_style(footer: &str) -> String {
     )
 }
 
-/// JSON in which no string can end the element.
 fn json_in_html(data: &impl Serialize) -> Result<String, serde_json::Error> {
     Ok(serde_json::to_string(data)?
         .replace('<', "\\u003c")

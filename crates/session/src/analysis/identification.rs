@@ -359,7 +359,6 @@ fn contradictions(zero: &IsothermalZero) -> impl Iterator<Item = ResultRemark> +
     })
 }
 
-/// Remark that gauge pressures are added to an unknown ambient pressure.
 fn unknown_barometer(map: &ChannelMap) -> Option<ResultRemark> {
     let unknown = Barometer::unknown();
     let used = [Channel::P1, Channel::P2].into_iter().any(|channel| map.is_gauge(channel));
@@ -381,7 +380,6 @@ struct Source {
     may_have_truth: bool,
 }
 
-/// The campaign that all recordings belong to; `None` if none names one.
 fn same_campaign(recorded: &[Recorded]) -> Result<Option<&Campaign>, SessionError> {
     let first = recorded.first().ok_or(SessionError::NoRecording)?;
     let Some(campaign) = &first.campaign else { return Ok(None) };

@@ -56,10 +56,8 @@ pub struct Results {
 pub(crate) struct Provenance {
     campaign: Option<Campaign>,
     plan: Option<Plan>,
-    /// How the run ended; `None` for points from recordings.
     ending: Option<RunEnding>,
     machine: String,
-    /// Test date for people.
     tested_at: Option<String>,
     sources: Vec<ReportSource>,
 }
@@ -93,7 +91,6 @@ impl Provenance {
         }
     }
 
-    /// Units of the map's pictures, as requested by the campaign.
     fn map_units(&self) -> MapUnits {
         let Some(campaign) = &self.campaign else { return MapUnits::default() };
         let display = Display::new(&campaign.display);
@@ -382,7 +379,6 @@ fn source(recorded: &Recorded) -> ReportSource {
     }
 }
 
-/// Remarks on the parts of a file that cannot be read, with its name if there are several.
 fn remarks_of(recorded: &Recorded, several: bool) -> impl Iterator<Item = ResultRemark> {
     let file = several.then(|| recorded.path.display().to_string());
     recorded.read.warnings.iter().map(move |warning| incomplete(file.clone(), warning))
@@ -437,7 +433,6 @@ fn export(
     Ok(paths)
 }
 
-/// The written files and their contents.
 #[derive(Debug, Serialize)]
 pub struct RigFiles {
     pub files: Vec<PathBuf>,
@@ -484,7 +479,6 @@ impl Session<'_> {
     }
 }
 
-/// The figure as PNG, with two pixels per unit.
 pub(crate) fn png(figure: &Figure) -> Result<Vec<u8>, SessionError> {
     Ok(figure.to_png(2.0).map_err(ExportError::failed("png"))?)
 }

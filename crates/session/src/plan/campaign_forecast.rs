@@ -45,7 +45,6 @@ pub struct CampaignForecast {
     pub is_planned: bool,
     /// Rig time from the start of the soak to the end of the cool-down, s; the maximum if the number of steps is an upper bound.
     pub duration_s: f64,
-    /// Expected problems.
     pub concerns: Vec<Concern>,
     /// Expected verdicts of the points; `None` for a script and for methods other than `joint`.
     pub verdicts: Option<VerdictForecast>,
@@ -157,7 +156,6 @@ impl<'a> SoakingHousings<'a> {
         Some(SoakingHousings { campaign, soak, settings: ZeroSettings::from(soak) })
     }
 
-    /// Difference of the compressor housing from the cell, K.
     fn difference_k(&self, after_s: f64) -> f64 {
         let ambient_k = self.campaign.boundary.ambient_temperature_k;
         let start = StandstillState { tc_k: ambient_k + WARM_K, tt_k: ambient_k + WARM_K };
@@ -287,7 +285,6 @@ fn required_error_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     })
 }
 
-/// A window dominated by the response of the declared T2 probe to the preceding step.
 fn probe_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let params = &campaign.machine.params;
     let (diameter_m, pipe_m) = (params.t2_probe_diameter_m, params.compressor.outlet_diameter_m);

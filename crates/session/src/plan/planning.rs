@@ -47,7 +47,6 @@ pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, S
     Ok(plan)
 }
 
-/// The points of a campaign in planned order, without any further forecast.
 pub(crate) fn order_points(campaign: &Campaign, model: &Model) -> Result<Vec<OperatingPoint>, SessionError> {
     let inputs = PlanInputs::of(campaign)?;
     let request = PlanRequest { method: None, ..inputs.request(campaign, model) };
@@ -102,7 +101,6 @@ impl PlanInputs {
     }
 }
 
-/// Error forecast of the campaign's method after its zero; `None` for imported points.
 fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
     let config = identification_after_zero(campaign);
     let scope = match campaign.identification.method {
@@ -114,7 +112,6 @@ fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
     Some(Box::new(Forecaster::of(config, scope)))
 }
 
-/// Expected identification settings after the zero, as far as known before the run.
 fn identification_after_zero(campaign: &Campaign) -> IdentifyConfig {
     let config = identification(campaign);
     match campaign.zero {
@@ -132,7 +129,6 @@ const LONGER_RATIO: f64 = 2.0;
 /// Minimum relative reduction of an offset by a longer soak that is reported.
 const MIN_REDUCTION_RATIO: f64 = 0.3;
 
-/// The remark of a plan; `None` without a zero or without declared offsets.
 fn zero_remark(campaign: &Campaign) -> Option<PlanRemark> {
     let soak = campaign.zero?;
     let left_after = |soak_s: f64| -> BTreeMap<Channel, f64> {
@@ -366,12 +362,10 @@ pub(crate) struct ScriptedSteps {
     current_step: Option<PlanStep>,
     settling: Option<SettleWatch>,
     pub(crate) finished: Option<StepResult>,
-    /// Ended steps with their actual times.
     pub done: Vec<PlanStep>,
 }
 
 impl ScriptedSteps {
-    /// The steps of a campaign's script on this rig.
     pub fn new(
         campaign: &Campaign,
         model: &Model,

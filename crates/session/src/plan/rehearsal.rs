@@ -115,7 +115,6 @@ impl Session<'_> {
     }
 }
 
-/// The current step of a rehearsal, and the highest speed so far.
 #[derive(Debug, Default)]
 struct Progress {
     to: Option<OperatingPoint>,

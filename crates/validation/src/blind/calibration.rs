@@ -69,7 +69,6 @@ impl DiagnosisSummary {
         self.candidates.iter().map(|(_, score)| *score).fold(f64::NEG_INFINITY, f64::max) - self.nothing
     }
 
-    /// Whether the true causes are among the candidates.
     pub(crate) fn is_listed(&self) -> bool {
         matches!(self.kind, CaseKind::None | CaseKind::Outside)
             || self.candidates.iter().any(|(causes, _)| *causes == self.causes)

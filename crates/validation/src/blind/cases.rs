@@ -174,7 +174,6 @@ impl Deck {
     }
 }
 
-/// Signs that an effect can have relative to its typical step.
 fn signs(effect: &Arc<dyn Effect>) -> Vec<f64> {
     let [parameter] = effect.info().parameters.as_slice() else { return vec![1.0] };
     let has = |sign: &f64| {

@@ -16,7 +16,6 @@ pub(crate) fn krpm(speed_rpm: f64) -> String {
     format!("{:.0} krpm", speed_rpm / 1e3)
 }
 
-/// Target speeds of table 1, slow to fast.
 pub(crate) fn target_speeds_rpm() -> [f64; 4] {
     let mut speeds = JUMPS.map(|(_, to_rpm)| to_rpm);
     speeds.sort_by(f64::total_cmp);
@@ -46,7 +45,6 @@ fn equality_panel(title: &str, axis: (&str, &str), band: Option<(f64, &str)>, se
     panel
 }
 
-/// Efficiency in %: model (mean in the window) and identified, for outcomes with a result.
 pub(crate) fn efficiency_pair(outcome: &Outcome) -> Option<(f64, f64)> {
     Some((100.0 * outcome.eta_mean, 100.0 * outcome.point.eta?))
 }
@@ -95,7 +93,6 @@ pub(crate) fn series_by_case<'a>(
         .collect()
 }
 
-/// Smallest and largest value of the outcomes at one target speed, as text.
 pub(crate) fn span_at_speed(
     outcomes: &[Outcome],
     speed_rpm: f64,

@@ -54,7 +54,6 @@ fn steady_error_points(steady: &SteadyState, errors: &[(f64, f64)]) -> f64 {
     100.0 * (apparent_efficiency(pressure_ratio, t1_k, t2_k, Air::PAPER) - steady.outputs.efficiency)
 }
 
-/// Table 1 on the paper's machine and rig, once for each seed.
 fn mapped() -> Result<Vec<Mapped>, ReproduceError> {
     let (machine, config) = (paper_machine(), config());
     let mut cases = Vec::new();

@@ -157,6 +157,7 @@ pub trait Kind: Sync {
     /// A one-line description.
     fn summary(&self) -> &'static str;
 
+    /// The items of a study.
     fn items(&self, study: &StudyFile) -> Result<StudyDraft, FleetError>;
 
     /// Processes one item and returns JSON. Equal payloads give equal results on any computer.

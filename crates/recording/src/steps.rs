@@ -135,7 +135,10 @@ pub(crate) fn find_steps(
         // Without a command: what the rig reached.
         let value = |command: Option<&Series>, channel: Channel| match command {
             Some(command) => held_number(command, settled_s),
-            None => median_number(series.get(&channel)?, 0.5 * (start_s + end_s), end_s),
+            None => {
+                let later_half = series.get(&channel)?.slice(0.5 * (start_s + end_s), end_s).1;
+                median(later_half.iter().filter(|value| value.is_finite()))
+            }
         };
         StepMarker {
             index,
@@ -174,10 +177,6 @@ pub(crate) fn find_steps(
         })));
     }
     steps
-}
-
-fn median_number(series: &Series, start_s: f64, end_s: f64) -> Option<f64> {
-    median(series.slice(start_s, end_s).1.iter().filter(|value| value.is_finite()))
 }
 
 /// First and last time of all samples, s.

@@ -244,6 +244,7 @@ pub(crate) fn display_scale(unit: &str) -> (f64, &str) {
 
 /// A value with a sentence for people, with values, units and remedy.
 pub trait Message {
+    /// The sentence.
     fn message(&self) -> String;
 }
 

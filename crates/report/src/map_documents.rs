@@ -329,7 +329,6 @@ fn evidence_text(evidence: EndEvidence) -> &'static str {
     }
 }
 
-/// The contribution of each source to the efficiency: median and largest of all points.
 fn sources(budgets: &[PointBudgets]) -> Table {
     let rows = || budgets.iter().filter_map(|point| point.eta.as_ref()).flat_map(|budget| &budget.rows);
     let mut names: Vec<&str> = Vec::new();

@@ -63,7 +63,9 @@ impl<'a> Session<'a> {
 pub enum SessionEvent {
     /// A run begins on this rig.
     RunStarted {
+        /// The rig.
         rig: RigDescription,
+        /// Planned steps; a script may make more or fewer.
         steps: usize,
         /// Planned rig time including soak, warm-up and cool-down, s.
         duration_s: f64,
@@ -75,6 +77,7 @@ pub enum SessionEvent {
     },
     /// A step begins; `end_s` of the marker is the planned end.
     StepStarted {
+        /// The step.
         #[serde(flatten)]
         marker: StepMarker,
         /// Planned rig time from its start to the end of the run, s.
@@ -101,11 +104,14 @@ pub enum SessionEvent {
     Progress {
         /// Completed share, 0 to 1.
         done_ratio: f64,
+        /// Description of the work.
         what: String,
     },
     /// Progress of work in separate pieces.
     PiecesDone {
+        /// Completed pieces.
         done: usize,
+        /// Total pieces.
         of: usize,
     },
 }
@@ -158,6 +164,7 @@ impl Registry {
         self.make_named_backend(&campaign.backend, campaign, model).map_err(SessionError::Backend)
     }
 
+    /// Setpoint ranges of a campaign's rig, if they are known without starting a driver.
     pub(crate) fn setpoint_ranges(&self, campaign: &Campaign, model: &Model) -> Option<SetpointRanges> {
         let BackendChoice { name, settings, .. } = &campaign.backend;
         let nominal = nominal_rig(campaign, model, self);

@@ -309,7 +309,6 @@ fn progress_line(what: &str, done_ratio: f64, elapsed_s: f64) -> String {
     format!("{:3.0} %  {what}, {} left", 100.0 * done_ratio, short_duration(left_s))
 }
 
-/// Number of finished pieces, elapsed time, and the estimated time remaining.
 fn pieces_line(done: usize, of: usize, elapsed_s: f64) -> String {
     match done {
         0 => format!("0 of {of} done"),

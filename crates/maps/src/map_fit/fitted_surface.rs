@@ -337,11 +337,6 @@ impl LineEndAngles {
     }
 }
 
-/// Lowest pressure ratio of a line: below 1 by a share of the line's pressure rise.
-fn lowest_pressure_ratio(highest_ratio: f64) -> f64 {
-    (1.0 - LOWEST_SHARE * (highest_ratio - 1.0)).clamp(MIN_LOWEST_RATIO, 1.0)
-}
-
 fn line_nodes(fit: &MapFit, ends: &LineEndAngles, speed_corrected_rpm: f64, count: usize) -> Vec<FittedNode> {
     let speed_ratio = fit.speed_ratio(speed_corrected_rpm);
     let shape = fit.solution.shape(speed_ratio);
@@ -405,7 +400,8 @@ fn line_nodes(fit: &MapFit, ends: &LineEndAngles, speed_corrected_rpm: f64, coun
 fn choke_end(shape: &LineShape, speed_ratio: f64, surge_rad: f64) -> f64 {
     let ratio = |angle: f64| shape.physical(angle, speed_ratio).pressure_ratio;
     let top = ratio(surge_rad.min(std::f64::consts::FRAC_PI_2)).max(ratio(surge_rad));
-    let wanted = lowest_pressure_ratio(top);
+    // Below 1 by a share of the line's pressure rise.
+    let wanted = (1.0 - LOWEST_SHARE * (top - 1.0)).clamp(MIN_LOWEST_RATIO, 1.0);
     if ratio(MIN_ANGLE_RAD) > wanted {
         return MIN_ANGLE_RAD;
     }

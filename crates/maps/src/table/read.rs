@@ -37,7 +37,7 @@ pub fn read_any_text(text: &str, description: &MapDescription) -> Result<Importe
         read_modelica(text, description)
     } else if text.lines().take(GSP_HEAD).any(|line| line.trim_start().starts_with("Reynolds:")) {
         read_gsp(text, description)
-    } else if has_arrays(text) {
+    } else if text.contains("np.array(") || text.lines().any(|line| line.replace(' ', "").contains("=[")) {
         read_arrays(text, description)
     } else {
         read_text(text, description)
@@ -54,10 +54,6 @@ const NPSS_TABLE: &str = "Table TB_";
 
 /// Lines above the tables of GSP and GasTurb. Bound: the title, which begins with 99, and the effect of the Reynolds number.
 const GSP_HEAD: usize = 10;
-
-fn has_arrays(text: &str) -> bool {
-    text.contains("np.array(") || text.lines().any(|line| line.replace(' ', "").contains("=["))
-}
 
 /// The map of a workbook: of its first sheet with a table of numbers.
 pub fn read_workbook(bytes: &[u8], description: &MapDescription) -> Result<ImportedMap, ImportError> {

@@ -13,6 +13,7 @@ pub struct Document {
 
 /// Data about one subject that people read.
 pub trait Describe {
+    /// Its document, in the usual units.
     fn document(&self) -> Document;
 }
 

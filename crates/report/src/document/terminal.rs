@@ -100,7 +100,6 @@ fn write(text: &mut String, document: &Document, paint: Paint) {
     }
 }
 
-/// Whether a blank line stands before and after the block.
 fn is_separated(block: &Block) -> bool {
     matches!(block, Block::Table(_) | Block::Facts(_) | Block::Section(_))
 }

@@ -90,7 +90,6 @@ pub(crate) fn shell(
     Ok(page.into_string())
 }
 
-/// The footer of each printed sheet, with the sheet's number and the total.
 fn footer_style(footer: &str) -> String {
     // Escaped as numbers, so that no letter of a name can end a string or an element.
     let text: String = footer

@@ -331,7 +331,6 @@ fn contradiction(faults: &[SuspectedFault]) -> Sentence {
     })
 }
 
-/// What to do about a sensor that reads another value at rest than its neighbours.
 fn offset_remedy(fault: &SuspectedFault, is_soak: bool) -> Sentence {
     let ([channel], "K" | "Pa") = (fault.channels.as_slice(), fault.unit.as_str()) else {
         return sentence!("repair the sensors, or declare their uncertainty");

@@ -388,7 +388,6 @@ fn corners(points: &[OperatingPoint]) -> Vec<OperatingPoint> {
     corners
 }
 
-/// Accepted steps of T3 and oil temperature within the limits, at constant speed and valve opening.
 fn temperature_steps(
     campaign: &Campaign,
     model: &Model,

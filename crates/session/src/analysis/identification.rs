@@ -346,7 +346,6 @@ impl Session<'_> {
     }
 }
 
-/// Remarks on instruments of the cell that contradict all sensors of a kind at rest.
 fn contradictions(zero: &IsothermalZero) -> impl Iterator<Item = ResultRemark> + '_ {
     let contradicting = zero.references.iter().filter(|reference| reference.contradiction().is_some());
     contradicting.filter_map(|reference| {
@@ -367,7 +366,6 @@ fn unknown_barometer(map: &ChannelMap) -> Option<ResultRemark> {
     )
 }
 
-/// Remark that a recording has a soak long enough for a zero, but no zero was requested.
 fn unused_rest(recording: &Recording, config: &IdentifyConfig) -> Option<ResultRemark> {
     let settings = ZeroSettings { shortest_s: UNUSED_REST_S, ..ZeroSettings::default() };
     let rest = isothermal_zero(recording, config, &settings).ok().filter(|rest| !rest.offsets.is_empty())?;

@@ -59,7 +59,6 @@ pub struct Lockout {
     pub run: PathBuf,
 }
 
-/// Content of a file: the name of its rig, and what is known about the rig.
 #[derive(Serialize, Deserialize)]
 struct Entry<T> {
     rig: String,

@@ -279,7 +279,6 @@ impl PreparedRun<'_> {
         Ok((self, RecordedRun { directory, recording, end, parts }))
     }
 
-    /// Removes the files of a run whose rig was not armed, and returns the error of the run.
     fn discard_unarmed_run(&self, error: RunError, directory: &Path) -> SessionError {
         if self.request.resume.is_none() && !error.leaves_rig_state_unknown() {
             // A failure leaves an empty run directory, which is harmless.

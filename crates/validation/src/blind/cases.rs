@@ -340,7 +340,6 @@ fn has_influence(effect: &Arc<dyn Effect>, meter: &dyn SignatureMeter) -> bool {
     })
 }
 
-/// The value at this number of typical steps from neutral, within the range.
 fn value_at(parameter: &EffectParameter, steps: f64) -> f64 {
     (parameter.neutral + steps * parameter.typical_step).clamp(parameter.low, parameter.high)
 }

@@ -123,7 +123,7 @@ pub(crate) fn points<'a>(
                     }
                 }
             }
-            let end = end_of_line(row);
+            let end = row.cells.iter().find_map(|cell| end_in(cell));
             points.push(Point { at: row.at, group, speed, vane, values, end, is_of_surge_line });
         }
     }
@@ -168,10 +168,6 @@ fn values(
         return Err(ImportError::RowForm { line: row.at, text, form: ROW_FORM });
     }
     Ok(values)
-}
-
-fn end_of_line(row: &GridRow) -> Option<LineEnd> {
-    row.cells.iter().find_map(|cell| end_in(cell))
 }
 
 const ROW_FORM: &str = "a row of corrected rpm, corrected kg/s, pressure ratio and efficiency";

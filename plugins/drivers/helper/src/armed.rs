@@ -4,7 +4,6 @@ use mapper_core::{Backend, BackendError, RigDescription, Setpoints};
 use mapper_driver_host::protocol::LEASE_S;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// An armed rig.
 pub(crate) struct Armed {
     /// On the driver's clock, s.
     pub(crate) at_s: f64,

@@ -18,7 +18,6 @@ fn number(reading: Option<f64>) -> String {
     reading.map_or_else(|| "#0".to_owned(), |value| value.to_string())
 }
 
-/// The answer to the text between STX and ETX.
 fn answer(stand: &Stand, body: &[u8]) -> Vec<u8> {
     let Ok((code, channel, _)) = parse_request(body) else { return write_answer(None, &[]) };
     let channels = measured();

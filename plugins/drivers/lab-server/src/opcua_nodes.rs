@@ -48,7 +48,6 @@ pub struct Shared {
 }
 
 impl Shared {
-    /// A value of the stand with its timestamp.
     fn value(&self, read: impl Fn(&Stand) -> Option<Variant>) -> Result<DataValue, StatusCode> {
         let stand = self.stand.lock().map_err(|_| StatusCode::BadInternalError)?;
         let age_s = (self.begun.elapsed().as_secs_f64() - stand.wall_s()).clamp(0.0, 60.0);
@@ -107,7 +106,6 @@ fn directory() -> Result<PathBuf, ServeError> {
     Ok(path)
 }
 
-/// The permitted user; `None`: anonymous.
 fn user() -> Result<Option<(String, String)>, ServeError> {
     let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
     match (variable(USER.0), variable(USER.1)) {

@@ -39,7 +39,6 @@ impl LinkError {
 /// Delay before a busy controller is asked for a second time.
 const RETRY_DELAY: Duration = Duration::from_millis(40);
 
-/// A table of registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Table {
@@ -49,19 +48,16 @@ pub(crate) enum Table {
     Input,
 }
 
-/// A connection that is opened on demand.
 pub(crate) struct Link {
     runtime: Runtime,
     address: SocketAddr,
     unit: u8,
     within: Duration,
-    /// Deadline of the current group of writes.
     deadline: Option<Instant>,
     connection: Option<Context>,
 }
 
 impl Link {
-    /// Does not connect yet.
     pub(crate) fn new(address: SocketAddr, unit: u8, within: Duration) -> std::io::Result<Link> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         Ok(Link { runtime, address, unit, within, deadline: None, connection: None })
@@ -80,7 +76,6 @@ impl Link {
         done
     }
 
-    /// Time left for a request, at most its own timeout.
     fn time_left(&self) -> Duration {
         let left = self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
         left.map_or(self.within, |left| left.min(self.within))

@@ -154,7 +154,6 @@ impl Grid {
         Grid { interval_s, t_s, signals }
     }
 
-    /// Number of grid points in a time, at least two.
     fn point_count(&self, time_s: f64) -> usize {
         ((time_s / self.interval_s).round() as usize).max(2)
     }

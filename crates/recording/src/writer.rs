@@ -24,7 +24,6 @@ struct TopicLayout {
     prefixes: Vec<Vec<u8>>,
 }
 
-/// Columns of one batch for one topic.
 struct Table<'a> {
     /// Position in the writer's layouts.
     layout: usize,
@@ -44,7 +43,6 @@ pub struct RecordingWriter {
     start_time_ns: u64,
     /// Whole second of the run's clock whose messages are not flushed yet.
     second: Option<i64>,
-    /// Time of the last sample written, flushed or not.
     last_sample_s: Option<f64>,
     saved_until_s: Option<f64>,
     failed: bool,

@@ -282,7 +282,6 @@ const RICH: u8 = 0x08;
 /// Set if phonetic data follow the characters.
 const EXTENDED: u8 = 0x04;
 
-/// Bytes in one record and those that continue it.
 struct Bytes<'a> {
     pieces: Vec<&'a [u8]>,
     piece: usize,

@@ -158,7 +158,6 @@ struct PieceChecker {
     read: Rc<Cell<u64>>,
     piece: Rc<Cell<u64>>,
     buffer: u64,
-    /// What is left of the memory, bytes.
     memory: Rc<Cell<u64>>,
 }
 

@@ -112,7 +112,6 @@ pub(crate) struct PlaceError {
     pub eta: f64,
 }
 
-/// A line with the covariance of its parameters.
 pub(crate) struct LineErrors {
     frame: FlowFrame,
     parameters: Parameters,
@@ -130,7 +129,6 @@ impl LineErrors {
         }
     }
 
-    /// Errors at an angle of the line, rad.
     pub(crate) fn at(&self, angle_rad: f64, scales: Scales) -> PlaceError {
         let at = |shape: &LineShape, angle: f64| {
             let place = shape.physical(angle, self.speed_ratio);
@@ -204,7 +202,6 @@ impl Default for MapFitOptions {
     }
 }
 
-/// The table without the errors at left-out lines.
 pub(crate) fn table(fit: &MapFit, options: &MapFitOptions) -> Result<FittedMap, MapFitError> {
     let (lowest_rpm, highest_rpm) = fit.speed_bounds_rpm();
     let measured = &fit.data.lines_rpm;

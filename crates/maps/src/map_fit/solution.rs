@@ -21,13 +21,10 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) struct Solution {
     pub splines: Splines,
     pub frame: FlowFrame,
-    /// Parameters at the knots.
     pub(crate) values: DMatrix<f64>,
-    /// Covariance of all unknowns, parameters first (parameter by parameter, knot by knot).
     pub(crate) covariance: DMatrix<f64>,
     /// Variance of the roughness: the inverse of its penalty.
     roughness_variance: Parameters,
-    /// Widening of the errors beyond the measured speeds.
     pub(crate) widening: EndWidenings,
     /// Standard deviations of the line offsets, logarithms.
     pub line_scatter: [f64; 3],

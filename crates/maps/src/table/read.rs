@@ -60,7 +60,6 @@ pub fn read_workbook(bytes: &[u8], description: &MapDescription) -> Result<Impor
     read(&grid_of_workbook(bytes, description.sheet.as_deref())?, description)
 }
 
-/// Information from the rows outside the table.
 #[derive(Default)]
 pub(super) struct Notes {
     pub(super) reference: Option<ReferenceState>,
@@ -166,7 +165,6 @@ pub(super) fn check_units_of_flow(grid: &Grid, layout: &Layout) -> Result<(), Im
     Err(ImportError::NoUnit { line, heading: column.heading.clone(), key, example })
 }
 
-/// Why a measured point has no efficiency.
 fn no_efficiency(point: &MeasuredPoint) -> Warning {
     Warning::NoCompression(point.t2_k.map_or(NoCompression::NoT2, |t2_k| NoCompression::NoRise {
         rise_k: t2_k - point.t1_k,
@@ -199,7 +197,6 @@ fn check_is_compressor(measured: &[MeasuredPoint]) -> Result<(), ImportError> {
 /// Maximum speed at standstill as a ratio of the fastest. Bound: the slowest lines of maps have a tenth of it.
 const STANDSTILL_RATIO: f64 = 0.01;
 
-/// Leaves out the points at standstill, which check the zero of a stand, with a remark.
 pub(super) fn leave_out_standstill(
     points: &mut Vec<Point<'_>>,
     speed: impl Fn(&Point<'_>) -> Option<f64>,
@@ -326,7 +323,6 @@ fn measured_point(
     })
 }
 
-/// An absolute pressure, Pa.
 pub(super) fn pressure_pa(
     point: &Point<'_>,
     quantity: Quantity,
@@ -360,7 +356,6 @@ fn correct(row: &mut Row, point: &MeasuredPoint, reference: ReferenceState) {
     row.eta = row.eta.or(t2_k.map(|t2_k| apparent_efficiency(row.pressure_ratio, point.t1_k, t2_k, air)));
 }
 
-/// Reads the rows outside the table.
 pub(super) fn read_notes(grid: &Grid, first_row: usize) -> Notes {
     let mut notes = Notes::default();
     for (index, row) in grid.rows.iter().enumerate() {

@@ -14,7 +14,6 @@ pub(crate) type Place = [f64; 3];
 /// Exponents of the three coordinates.
 pub(crate) type Term = [i32; 3];
 
-/// A value to fit, and the line to which it belongs.
 #[derive(Debug, Clone)]
 pub(crate) struct Observation {
     pub place: Place,
@@ -24,14 +23,12 @@ pub(crate) struct Observation {
     pub changes: Vec<f64>,
 }
 
-/// A fitted polynomial.
 #[derive(Debug, Clone)]
 pub(crate) struct Surface {
     terms: Vec<Term>,
     coefficients: DVector<f64>,
     /// Those of the change by each error that all values share.
     common: Vec<DVector<f64>>,
-    /// Inverse of the normal matrix.
     inverse: DMatrix<f64>,
     centre: Place,
     half_range: Place,

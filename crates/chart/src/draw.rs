@@ -218,7 +218,6 @@ fn draw_scatter(drawing: &mut Drawing, frame: &Frame, scatter: &Scatter) {
     }
 }
 
-/// Draws a bar with caps; an end outside the frame is cut and has no cap.
 fn draw_error_bar(
     drawing: &mut Drawing,
     frame: &Frame,

@@ -44,7 +44,6 @@ impl WallClock for SystemClock {
     }
 }
 
-/// Calls `then` with all kinds of studies and this computer.
 pub fn with_machine<T>(
     then: impl FnOnce(&Registry, &[&dyn Kind], &Machine<'_>) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
@@ -59,7 +58,6 @@ pub fn with_machine<T>(
     then(&registry, &kinds, &machine)
 }
 
-/// Calls `then` with an opened fleet directory, and shows progress.
 pub fn with_fleet<T>(
     directory: &Path,
     jobs: Option<usize>,

@@ -31,7 +31,6 @@ const SOURCES: &[(&str, &str)] = &[
     ("fmi2TypesPlatform.h", include_str!("../c/fmi2/fmi2TypesPlatform.h")),
 ];
 
-/// Writes the description with the GUID of the sources.
 pub fn description(
     machine: &FmuMachine<'_>,
     variables: &[Variable],
@@ -193,7 +192,6 @@ pub fn array(text: &mut String, name: &str, values: impl IntoIterator<Item = f64
     Ok(())
 }
 
-/// A variable's name as part of a C identifier.
 pub fn identifier(name: &str) -> String {
     name.replace('.', "_")
 }
@@ -225,7 +223,6 @@ pub fn header(
     Ok(text)
 }
 
-/// The header with the GUID of the model description.
 pub fn with_guid(header: &str, guid: &str) -> String {
     header.replacen(
         "#define MODEL_DATA_H\n",

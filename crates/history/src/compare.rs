@@ -166,7 +166,6 @@ fn compare_points(run: &RunRow, before: &[&RunRow], moved: &mut Vec<PointsOutsid
     }
 }
 
-/// Which part of the program probably changed, one sentence for each campaign and quantity.
 fn conclusions(
     night: &Night,
     earlier: &BTreeMap<RunKey, Vec<RunRow>>,

@@ -126,7 +126,6 @@ pub(crate) struct Feed {
 
 struct FeedState {
     state: State,
-    /// Rows not yet sent to browsers.
     unsent: VecDeque<Vec<Option<f64>>>,
     last_tick: Option<Instant>,
     /// Excess of each step's actual duration over the planned one, s.

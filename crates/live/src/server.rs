@@ -125,7 +125,6 @@ fn page(stream: &mut impl Write, page: &str) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Sends the complete state, then every message, until one side disconnects.
 fn events(stream: &mut impl Write, served: &ServedContent, connection: &Connection) -> std::io::Result<()> {
     let Some(messages) = served.hub.join(connection.address, (served.snapshot)()) else {
         return plain(stream, "503 Service Unavailable");

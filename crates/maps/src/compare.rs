@@ -173,7 +173,6 @@ struct NearestDeviation<'a> {
     pressure_ratio_difference: f64,
     distance_ratio: f64,
     eta_difference: f64,
-    /// Node of the first line just before the place.
     before: &'a FittedNode,
 }
 

@@ -99,7 +99,6 @@ struct Grid {
 struct Signal {
     channel: Channel,
     values: Vec<f64>,
-    /// Sums of the values before each grid point.
     sums: Vec<f64>,
     sigma: f64,
     min_jump_ratio: f64,

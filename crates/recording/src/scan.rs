@@ -136,7 +136,6 @@ impl ScanResult {
         }
     }
 
-    /// Whether this many bytes of definitions still fit.
     fn has_room(&mut self, bytes: usize) -> bool {
         let together = self.defined_bytes.saturating_add(bytes);
         let fits = together <= MAX_DEFINITIONS_BYTES;

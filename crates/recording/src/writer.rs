@@ -17,7 +17,6 @@ use std::path::{Path, PathBuf};
 /// A topic of numeric fields in the file. All batches have the same topics: a schema for each batch would cost more than the samples.
 struct TopicLayout {
     topic: &'static str,
-    /// Names and units of the fields.
     fields: Vec<(String, String)>,
     channel_id: u16,
     /// Text before each value: `{"speed_rpm":`, then `,"flow_kg_s":` and so on.

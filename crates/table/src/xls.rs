@@ -46,7 +46,6 @@ struct Globals {
     has_flags: bool,
     from_1904: bool,
     strings: Vec<Rc<str>>,
-    /// Whether each format of a cell is one of dates.
     is_date: Vec<bool>,
     /// Position, name and whether it is hidden.
     sheets: Vec<(usize, String, bool)>,

@@ -21,7 +21,6 @@ pub(crate) struct SimulationTable {
     pub flow_kg_s: Vec<Vec<f64>>,
     pub pressure_ratio: Vec<Vec<f64>>,
     pub eta: Vec<Vec<f64>>,
-    /// Speeds of the extrapolated lines, rpm.
     pub extrapolated_rpm: Vec<f64>,
 }
 

@@ -250,7 +250,6 @@ struct LineEndAngles {
     /// Spline of the smooth surge-side end, with its knot values.
     spline: SpeedSpline,
     surge: DVector<f64>,
-    /// For each measured line.
     measured: Vec<MeasuredEnds>,
 }
 

@@ -87,7 +87,6 @@ impl Observation {
 pub(crate) struct Observations {
     /// Unit of speed ratios, rpm.
     pub nominal_speed_rpm: f64,
-    /// Corrected speeds of the lines, rpm, rising.
     pub lines_rpm: Vec<f64>,
     pub points: Vec<Observation>,
     /// Errors common to all points, which the residuals do not show.

@@ -23,7 +23,6 @@ pub(crate) struct Solution {
     pub frame: FlowFrame,
     pub(crate) values: DMatrix<f64>,
     pub(crate) covariance: DMatrix<f64>,
-    /// Variance of the roughness: the inverse of its penalty.
     roughness_variance: Parameters,
     pub(crate) widening: EndWidenings,
     /// Standard deviations of the line offsets, logarithms.
@@ -36,7 +35,6 @@ pub(crate) struct Solution {
     deviance: f64,
     /// Highest efficiency of the fit at the points, fraction.
     pub best_eta: f64,
-    /// Angles of the feet, in the order of the points.
     pub angles_rad: Vec<f64>,
 }
 
@@ -139,16 +137,13 @@ const DAMPING: DampingRule = DampingRule {
 enum Start<'a> {
     /// From the points alone, with this scale of the residuals.
     Scale(f64),
-    /// From the result of another fit.
     Fit(&'a Solution),
 }
 
 enum Phase {
     /// Parameters with fixed starting variances.
     Free,
-    /// Estimation of the variances.
     Estimate,
-    /// Parameters with the estimated variances.
     Settle,
 }
 

@@ -9,7 +9,6 @@ use mapper_core::{CompressorMap, ImportError, ImportRemark, ImportedMap, MapDesc
 #[derive(Debug, Default)]
 struct BetaTables {
     speeds: Vec<f64>,
-    /// Auxiliary coordinate of the columns.
     beta: Vec<f64>,
     flow: Vec<f64>,
     pressure_ratio: Vec<f64>,

@@ -10,7 +10,6 @@ pub struct MapDesign {
     pub speed: f64,
     /// Flow, pressure ratio and efficiency there; `None` if the tables do not have the point.
     pub values: Option<[f64; 3]>,
-    /// Auxiliary coordinate.
     pub rline: f64,
 }
 

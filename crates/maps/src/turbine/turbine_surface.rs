@@ -105,7 +105,6 @@ impl Surface {
         surface.left_out_rms.is_finite().then_some(surface)
     }
 
-    /// Solves for the coefficients; `None` if the observations do not determine them.
     fn solve(&mut self, observations: &[Observation]) -> Option<()> {
         if observations.len() < self.terms.len() {
             return None;

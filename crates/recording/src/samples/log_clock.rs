@@ -152,7 +152,6 @@ pub(crate) struct BlockAverager {
 #[derive(Debug, Default)]
 enum State {
     #[default]
-    /// The rate is not known yet.
     Undecided,
     Unchanged(RecentIntervals),
     /// At any rate.
@@ -174,7 +173,6 @@ impl Default for RecentIntervals {
 }
 
 impl RecentIntervals {
-    /// Whether most of the intervals have become short.
     fn becomes_fast(&mut self, t_s: f64) -> bool {
         let step_s = t_s - self.last_s;
         if step_s > 0.0 || self.last_s.is_nan() {

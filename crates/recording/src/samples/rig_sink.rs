@@ -42,7 +42,6 @@ pub(crate) enum SinkMessage {
     /// Unusual provenance, with the size of the message in bytes.
     Origins(OriginMessage, usize),
     Event(Event, usize),
-    /// Unreadable.
     Damaged,
 }
 

@@ -166,7 +166,6 @@ const CLASSES: [(f64, Colour, &str); 4] = [
     (f64::INFINITY, palette::VERMILLION, "beyond 10 sigma"),
 ];
 
-/// Ends of the steps on the compressor map, coloured by their residual, before and after.
 pub(crate) fn residual_maps(study: &Study, evidence: &Evidence) -> Vec<Figure> {
     let mut pictures = Vec::new();
     let after = evidence.with_cause.as_ref().map(|(cause, _, residual)| (format!("with {cause}"), residual));

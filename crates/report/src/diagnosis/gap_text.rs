@@ -354,7 +354,6 @@ fn add_unjudged(document: &mut Document, baseline: &Baseline) {
 /// Width of lines of a campaign.
 const WIDTH: usize = 78;
 
-/// A mapping of a campaign on few lines, broken between its entries.
 fn flow_mapping(start: &str, entries: &[String], end: &str) -> String {
     let mut lines = vec![start.to_owned()];
     for (index, entry) in entries.iter().enumerate() {

@@ -8,7 +8,6 @@ use mapper_core::{
     Dimension, IdentifiedPoint, Method, ResultRemark, Verdict, half_width_95, probability_text, step_number,
 };
 
-/// A sentence, and the steps that it applies to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Doubt<'a> {
     steps: Vec<usize>,

@@ -30,7 +30,6 @@ pub(crate) enum Column {
     T2Change,
     T1,
     P1,
-    /// Readings at the end of the step.
     Read(Channel),
     Verdict,
     TrueEta,

@@ -163,7 +163,6 @@ fn instrument_rows(
     campaign.sensors.iter().map(row).collect()
 }
 
-/// Common reading of the zero for a sensor that was zeroed.
 fn rest_reading(zero: Option<&IsothermalZero>, channel: Channel) -> Option<f64> {
     let zero = zero?;
     zero.offsets.get(&channel)?;

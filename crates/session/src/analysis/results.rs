@@ -171,7 +171,6 @@ impl Session<'_> {
         self.write_identification(recorded, directory, |recorded| self.identify(recorded, map, method))
     }
 
-    /// The same for recordings that are identified in another way.
     pub(crate) fn write_identification(
         &self,
         recorded: Vec<Recorded>,
@@ -437,7 +436,6 @@ fn export(
 pub struct RigFiles {
     pub files: Vec<PathBuf>,
     pub turbine: Vec<ScoredTurbinePoint>,
-    /// Parameters common to all points (joint method).
     pub thermal: Option<ThermalModel>,
 }
 

@@ -330,7 +330,6 @@ fn evenly_spaced_rpm((low_rpm, high_rpm): (f64, f64)) -> Vec<f64> {
 
 #[derive(Debug)]
 pub(crate) struct FirstMap {
-    /// Name of its file in the campaign's directory.
     pub file_name: String,
     pub text: String,
     /// Corrected speeds of the grid in order, rpm.

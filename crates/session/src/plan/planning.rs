@@ -217,7 +217,6 @@ pub fn hold_near_surge(campaign: &Campaign, model: &Model, point: OperatingPoint
     })
 }
 
-/// Adds the search, as forecast on the nominal machine, to a plan's duration and remarks.
 pub(crate) fn add_surge_search(campaign: &Campaign, model: &Model, plan: &mut Plan) {
     let Some(seek) = campaign.surge_search else { return };
     let mut ends: Vec<OperatingPoint> = Vec::new();
@@ -296,7 +295,6 @@ pub fn stored_plan(path: &Path, now: &PlanInputHashes, campaign: &Campaign) -> R
     }
 }
 
-/// The first violation in a plan, in words.
 fn find_violation(plan: &Plan, campaign: &Campaign) -> Option<String> {
     if plan.steps.is_empty() || plan.steps.len() > MAX_STEPS {
         return Some(format!("it has {} steps; a plan has 1 to {MAX_STEPS}", plan.steps.len()));

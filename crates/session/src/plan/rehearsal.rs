@@ -138,7 +138,6 @@ struct NoObserver;
 
 impl RunObserver for NoObserver {}
 
-/// Steps on the nominal machine; their identified points are the forecast.
 struct RehearsalSteps {
     steps: ScriptedSteps,
     notes: Vec<String>,

@@ -290,7 +290,6 @@ impl Claim {
         replace().map_err(SessionError::file("write", &self.states.file(&self.rig, "lock")))
     }
 
-    /// Prevents further runs until this lockout is acknowledged.
     pub fn lock_out(&self, lockout: &Lockout) -> Result<(), SessionError> {
         let path = self.states.file(&self.rig, "latch");
         let text = json_text(&Entry { rig: self.rig.clone(), content: lockout })?;

@@ -382,14 +382,12 @@ pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// As [`fixed`], with a plus sign for positive values.
 pub(crate) fn signed(value: f64, decimals: usize) -> String {
     let text = fixed(value, decimals);
     let zero = text.chars().all(|c| c == '0' || c == '.' || c == '-');
     if zero || text.starts_with('-') { text } else { format!("+{text}") }
 }
 
-/// As [`signed`]; `-` for a missing value.
 pub(crate) fn signed_or_dash(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".to_owned(), |value| signed(value, decimals))
 }

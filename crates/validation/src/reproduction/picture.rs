@@ -6,12 +6,10 @@ use mapper_chart::{Axis, Colour, Dash, Line, Marker, Panel, Scatter, palette};
 use mapper_numerics::statistics::range;
 use mapper_report::{Table, markdown_table};
 
-/// Colour of a target speed: ordered, slow to fast.
 pub(crate) fn speed_colour(speed_rpm: f64) -> Colour {
     palette::sequential((speed_rpm - 50e3) / 100e3)
 }
 
-/// `110 krpm`.
 pub(crate) fn krpm(speed_rpm: f64) -> String {
     format!("{:.0} krpm", speed_rpm / 1e3)
 }
@@ -76,7 +74,6 @@ pub(crate) fn series_by_speed(
     target_speeds_rpm().map(series).to_vec()
 }
 
-/// One series for each of several cases, with its label.
 pub(crate) fn series_by_case<'a>(
     cases: impl Iterator<Item = (&'a Vec<Outcome>, String)>,
     markers: [Marker; 5],

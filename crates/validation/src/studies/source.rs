@@ -30,7 +30,6 @@ impl From<StudyError> for FleetError {
     }
 }
 
-/// All input files of a campaign.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CampaignSource {

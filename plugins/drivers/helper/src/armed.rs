@@ -92,11 +92,8 @@ pub(crate) struct Descent {
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum DescentState {
-    /// No command is due.
     NothingDue,
-    /// The due command was sent.
     CommandSent,
-    /// The rig has confirmed its safe state.
     Safe,
     /// The rig does not confirm its safe state; the command is repeated.
     NotConfirmed(String),
@@ -108,7 +105,6 @@ impl Descent {
         Descent { from, begun_s: now_s, due_s: now_s, cut: false }
     }
 
-    /// Sends the command that is due at this run time, s.
     fn execute_step(
         &mut self,
         rig: &mut dyn Backend,

@@ -17,13 +17,11 @@ pub(crate) const QUEUE_LENGTH: usize = 256;
 const MAX_WAIT_S: f64 = 3600.0;
 
 pub(crate) enum DriverEvent {
-    /// A host has connected to the socket.
     #[cfg(unix)]
     Connected(std::os::unix::net::UnixStream),
     Message(Box<Message>),
     /// The host has disconnected, or sent an invalid frame.
     Closed,
-    /// A signal requests termination.
     Terminate,
 }
 

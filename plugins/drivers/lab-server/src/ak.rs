@@ -55,7 +55,6 @@ async fn serve_client(mut stream: TcpStream, stand: Arc<Mutex<Stand>>) -> std::i
     }
 }
 
-/// Serves until the listener fails.
 pub async fn serve(listener: TcpListener, stand: Arc<Mutex<Stand>>) -> std::io::Result<()> {
     let permits = Arc::new(tokio::sync::Semaphore::new(CONNECTIONS));
     loop {

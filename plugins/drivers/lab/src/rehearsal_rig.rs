@@ -76,9 +76,7 @@ pub(crate) const NAME: &str = "lab";
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Settings {
-    /// The campaign that defines machine, sensors and built-in backend.
     campaign: PathBuf,
-    /// Whether the lab runs in wall time.
     #[serde(default)]
     real_time: bool,
     command_log: Option<PathBuf>,

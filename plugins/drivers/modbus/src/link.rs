@@ -15,13 +15,10 @@ use tokio_modbus::prelude::{ExceptionCode, Request, Response, Slave};
 
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum LinkError {
-    /// The answer is late.
     #[error("{address} did not answer within {} ms (`timeout`, at most 800 ms; slower controllers are not supported)", within.as_millis())]
     Late { address: SocketAddr, within: Duration },
-    /// The connection failed.
     #[error("{address}: {reason}")]
     Failed { address: SocketAddr, reason: String },
-    /// The controller refuses.
     #[error("{address} refuses {operation}: {reason}")]
     Refused { address: SocketAddr, operation: String, code: ExceptionCode, reason: String },
 }
@@ -44,7 +41,6 @@ const RETRY_DELAY: Duration = Duration::from_millis(40);
 pub(crate) enum Table {
     /// Holding registers (read and write).
     Holding,
-    /// Input registers.
     Input,
 }
 
@@ -153,13 +149,11 @@ impl Link {
         Err(LinkError::Failed { address: self.address, reason })
     }
 
-    /// A short delay for a busy controller.
     fn pause(&self) {
         let pause = RETRY_DELAY.min(self.time_left());
         self.runtime.block_on(async { tokio::time::sleep(pause).await });
     }
 
-    /// Describes an exception with its number, as manuals list it, and with the unit if that is the cause.
     fn describe_exception(&self, code: ExceptionCode) -> String {
         let number = u8::from(code);
         match code {

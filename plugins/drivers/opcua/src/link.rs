@@ -179,7 +179,6 @@ impl Link {
         LinkError::Failed { server: self.server(), message: message.into() }
     }
 
-    /// The endpoint with the requested security and the pinned certificate.
     fn choose(
         &self,
         store: &Store,
@@ -286,7 +285,6 @@ impl Link {
         }
     }
 
-    /// Waits for the connection. On timeout, returns the last error.
     fn wait(&mut self, within: Duration) -> Result<(), Option<StatusCode>> {
         let Some(open) = &mut self.open else { return Err(None) };
         let connected = async {

@@ -41,7 +41,6 @@ impl Cells for CellsWithUnits<'_> {
 pub(crate) struct Table {
     pub(crate) layout: Layout,
     clocks: Clocks,
-    /// Column of the table for each column of the layout.
     sources: Vec<usize>,
     data_row: usize,
     missing: Vec<f64>,

@@ -70,7 +70,6 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// The layout below headings, with a remark on those that no group uses.
     fn below(headings: &Headings, groups: Vec<Group>) -> Layout {
         let used: Vec<usize> =
             groups.iter().flat_map(|group| &group.columns).map(|column| column.index).collect();

@@ -32,7 +32,6 @@ impl Case {
     }
 }
 
-/// A point of table 1 on the noisy rig, by both ways of mapping.
 struct Mapped {
     to_rpm: f64,
     /// Apparent minus true efficiency when the point has settled at 500 degC, points.

@@ -137,6 +137,7 @@ fn format_points(points: &[(f64, f64)]) -> String {
 }
 
 impl crate::Figure {
+    /// The picture as an SVG document. The same figure gives the same bytes.
     pub fn to_svg(&self) -> String {
         write_document(&crate::draw::draw_figure(self))
     }

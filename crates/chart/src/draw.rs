@@ -218,7 +218,6 @@ fn draw_scatter(drawing: &mut Drawing, frame: &Frame, scatter: &Scatter) {
     }
 }
 
-/// Draws a bar with caps; an end outside the frame is cut and has no cap.
 fn draw_error_bar(
     drawing: &mut Drawing,
     frame: &Frame,
@@ -293,7 +292,6 @@ fn draw_contours(
     }
 }
 
-/// Draws the labels; called last, because they avoid everything else.
 fn draw_point_labels(drawing: &mut Drawing, placed: &PlacedPanel<'_>, late: &mut Vec<LateText>) {
     let texts = late.iter().map(|text| text_box(text.at, &text.text, &text.style)).collect();
     let mut surroundings = Surroundings::of(&placed.frame, &placed.panel.items, texts);

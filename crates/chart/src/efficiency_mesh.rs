@@ -218,7 +218,6 @@ impl<'a> Monotone<'a> {
         Some(Monotone { x, y, slopes })
     }
 
-    /// Value at `at`; `None` outside the points.
     pub(crate) fn at(&self, at: f64) -> Option<f64> {
         let last = self.x.len() - 1;
         if !(at >= self.x[0] && at <= self.x[last]) {

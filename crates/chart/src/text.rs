@@ -51,7 +51,6 @@ pub(crate) fn wrap(text: &str, font_px: f64, max_px: f64) -> Vec<String> {
     lines
 }
 
-/// Truncates a text to the width, with an ellipsis.
 pub(crate) fn cut(text: &str, font_px: f64, max_px: f64) -> String {
     if width_px(text, font_px) <= max_px {
         return text.to_owned();

@@ -10,7 +10,6 @@ use mapper_session::{Registry, shared_state_directory};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Every plug-in.
 pub fn registry() -> Registry {
     Registry { commit: env!("MAPPER_COMMIT"), ..mapper::plugins() }
 }
@@ -21,17 +20,14 @@ pub fn rig_states_directory(argument: Option<&Path>) -> PathBuf {
     argument.map(Path::to_owned).or(variable.map(PathBuf::from)).unwrap_or_else(shared_state_directory)
 }
 
-/// The computer's monotonic clock.
 pub struct SystemClock(Instant);
 
 impl SystemClock {
-    /// Begins now.
     pub fn new() -> Self {
         SystemClock(Instant::now())
     }
 }
 
-/// The current day, UTC; `None` before 1970.
 pub fn today() -> Option<Date> {
     Date::from_epoch_ns(u64::try_from(jiff::Timestamp::now().as_nanosecond()).unwrap_or(0))
 }
@@ -48,7 +44,6 @@ impl WallClock for SystemClock {
     }
 }
 
-/// Calls `then` with all kinds of studies and this computer.
 pub fn with_machine<T>(
     then: impl FnOnce(&Registry, &[&dyn Kind], &Machine<'_>) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
@@ -63,7 +58,6 @@ pub fn with_machine<T>(
     then(&registry, &kinds, &machine)
 }
 
-/// Calls `then` with an opened fleet directory, and shows progress.
 pub fn with_fleet<T>(
     directory: &Path,
     jobs: Option<usize>,

@@ -123,7 +123,6 @@ fn more_signals() -> Vec<i32> {
     Vec::new()
 }
 
-/// The flags that Ctrl-C raises while a rig is run.
 #[cfg(not(unix))]
 pub fn run_stop() -> Result<RunStop, Failure> {
     let stop = RunStop::default();

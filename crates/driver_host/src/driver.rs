@@ -219,7 +219,6 @@ impl Driver {
         }
     }
 
-    /// Sends a request and waits for the response. Samples that arrive earlier are kept.
     fn request(
         &mut self,
         call: &'static str,

@@ -64,7 +64,6 @@ impl SearchPath {
         socket.or_else(|| program().map(Endpoint::Program))
     }
 
-    /// A file with the program's name that is not executable.
     pub(crate) fn find_not_executable(&self, name: &str) -> Option<PathBuf> {
         let file = file_name(name)?;
         self.programs.iter().map(|directory| directory.join(&file)).find(|program| program.is_file())

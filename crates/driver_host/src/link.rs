@@ -127,7 +127,6 @@ impl Link {
         self.frame_limit.store(bytes, Ordering::Relaxed);
     }
 
-    /// The next message; `None` if none arrives in time.
     pub(crate) fn receive(&self, within: Duration) -> Result<Option<Message>, DriverError> {
         match self.received.recv_timeout(within) {
             Ok(incoming) => incoming.map(Some),
@@ -332,7 +331,6 @@ impl SampleQueue {
         }
     }
 
-    /// Whether a sample at or after `t_s` has arrived.
     pub(crate) fn has_reached(&self, t_s: f64) -> bool {
         self.last_s.is_some_and(|last_s| last_s >= t_s)
     }

@@ -26,7 +26,6 @@ const MIN_REPLACED_LENGTH: usize = 6;
 /// Maximum nesting of settings that is searched; the YAML reader allows less.
 const MAX_DEPTH: usize = 64;
 
-/// Environment values that settings refer to.
 #[derive(Default)]
 pub(crate) struct Secrets(Vec<String>);
 

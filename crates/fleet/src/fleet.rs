@@ -64,7 +64,6 @@ impl Fleet {
         self.parts().join(part_name(hash))
     }
 
-    /// File that marks the item as in progress; contains the name of the worker.
     pub(crate) fn progress_marker(&self, hash: &Hash) -> PathBuf {
         self.directory.join(BEGUN).join(hash.to_string())
     }

@@ -53,7 +53,6 @@ impl Status {
         self.items - self.done
     }
 
-    /// The items without a result: failed, refused and missing.
     pub(crate) fn unfinished_items(&self) -> impl Iterator<Item = &UnfinishedItem> {
         self.failed.iter().chain(&self.refused).chain(&self.missing)
     }
@@ -225,7 +224,6 @@ impl Fleet {
         Ok(MergeOutcome { status, result: Some((result, description)) })
     }
 
-    /// Renames a part with changed content, which would otherwise count as done because its header is intact.
     fn rename_changed_part(&self, changed: &UnfinishedItem) {
         let part = self.part(&changed.hash);
         let is_changed = changed.why.as_deref() == Some(PartRefusal::Checksum.to_string().as_str());
@@ -235,7 +233,6 @@ impl Fleet {
     }
 }
 
-/// Moves each file to the result's directory and removes the files of an earlier merge.
 fn install(new: &Path, result: &Path) -> Result<(), FleetError> {
     make_directory(result.to_owned())?;
     let names = |folder: &Path| -> Result<Vec<_>, FleetError> {

@@ -298,11 +298,6 @@ impl Template {
         let text = String::from_utf8_lossy(&bytes).into_owned();
         Ok(Template { name: path.display().to_string(), text })
     }
-
-    /// The line that prints the state of each task of the job `$WORK`.
-    fn state_query(&self) -> Option<&str> {
-        self.text.lines().find_map(|line| line.strip_prefix("#states: "))
-    }
 }
 
 pub(crate) fn shell_quote(text: &str) -> String {
@@ -311,7 +306,6 @@ pub(crate) fn shell_quote(text: &str) -> String {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct QueueJobs {
-    /// ID of the array job.
     pub work: String,
     /// ID of the merge job; or, if the queue refused it after it had accepted the array, its answer.
     pub merge: Result<Option<String>, String>,
@@ -348,7 +342,7 @@ pub(crate) fn run_submission(script: &Path, template: &Template) -> Result<Queue
 
 /// Number of tasks of a job in each state, for display; `None` if the queue does not answer within some seconds.
 pub fn query_task_states(template: &Template, job: &str) -> Option<BTreeMap<String, usize>> {
-    let query = template.state_query()?;
+    let query = template.text.lines().find_map(|line| line.strip_prefix("#states: "))?;
     let mut child = Command::new("sh")
         .args(["-c", query])
         .env("WORK", job)

@@ -142,7 +142,6 @@ impl Fleet {
         item_outcome
     }
 
-    /// The reason for the failure of an item, from its part.
     pub(crate) fn failure_reason(&self, item: &ItemEntry) -> String {
         match self.read_part(item) {
             Some(Ok((_, body))) => body.chars().take(MAX_REASON_CHARS).collect(),

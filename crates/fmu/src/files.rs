@@ -31,7 +31,6 @@ const SOURCES: &[(&str, &str)] = &[
     ("fmi2TypesPlatform.h", include_str!("../c/fmi2/fmi2TypesPlatform.h")),
 ];
 
-/// Writes the description with the GUID of the sources.
 pub fn description(
     machine: &FmuMachine<'_>,
     variables: &[Variable],
@@ -182,7 +181,6 @@ pub fn number(name: &str, value: f64) -> Result<String, FmuError> {
     }
 }
 
-/// The numbers of an array, comma-separated.
 pub fn numbers(name: &str, values: impl IntoIterator<Item = f64>) -> Result<String, FmuError> {
     Ok(values.into_iter().map(|value| number(name, value)).collect::<Result<Vec<_>, _>>()?.join(", "))
 }
@@ -194,7 +192,6 @@ pub fn array(text: &mut String, name: &str, values: impl IntoIterator<Item = f64
     Ok(())
 }
 
-/// A variable's name as part of a C identifier.
 pub fn identifier(name: &str) -> String {
     name.replace('.', "_")
 }
@@ -226,7 +223,6 @@ pub fn header(
     Ok(text)
 }
 
-/// The header with the GUID of the model description.
 pub fn with_guid(header: &str, guid: &str) -> String {
     header.replacen(
         "#define MODEL_DATA_H\n",
@@ -254,7 +250,6 @@ fn constants(text: &mut String, reference: ReferenceState) -> Result<(), FmuErro
     Ok(())
 }
 
-/// The gases of both sides, and the vapour that `compressor.humidity` adds.
 fn gases(text: &mut String, params: &Params) -> Result<(), FmuError> {
     text.push_str(
         "typedef struct {\n    double constant, cp[7];\n    int is_real;\n    double virial[5], virial_with_vapour[5];\n} Gas;\n",

@@ -5,7 +5,6 @@ use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
 use mapper_physics::compressor_map::tabulated_map::{MapError, MapRow, TabulatedMap};
 use mapper_physics::machine::params::{BoundaryConditions, Params, State};
 
-/// Role of a variable for the importer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Causality {
     /// Fixed before the simulation runs.
@@ -19,13 +18,10 @@ pub enum Causality {
 /// A real variable. Its index in the list is its value reference.
 #[derive(Debug, Clone, Copy)]
 pub struct Variable {
-    /// Name; dots separate groups.
     pub name: &'static str,
-    /// Role.
     pub causality: Causality,
     /// Unit, one of [`UNITS`].
     pub unit: &'static str,
-    /// Initial value; `None` for outputs.
     pub start: Option<f64>,
     pub description: &'static str,
 }
@@ -34,7 +30,6 @@ pub struct Variable {
 #[derive(Debug, Clone, Copy)]
 pub struct Switch {
     pub name: &'static str,
-    /// Initial value.
     pub start: bool,
     pub description: &'static str,
 }
@@ -160,7 +155,6 @@ pub fn variables(machine: &FmuMachine<'_>) -> Vec<Variable> {
     ]
 }
 
-/// The boolean parameters of a machine.
 pub fn switches(machine: &FmuMachine<'_>) -> [Switch; 3] {
     [
         Switch {

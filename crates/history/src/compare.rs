@@ -166,7 +166,6 @@ fn compare_points(run: &RunRow, before: &[&RunRow], moved: &mut Vec<PointsOutsid
     }
 }
 
-/// Which part of the program probably changed, one sentence for each campaign and quantity.
 fn conclusions(
     night: &Night,
     earlier: &BTreeMap<RunKey, Vec<RunRow>>,
@@ -220,7 +219,6 @@ fn conclusions(
     sentences
 }
 
-/// Inputs of the runs that changed since the last night, as sentences.
 fn changed_inputs(night: &Night, earlier: &BTreeMap<RunKey, Vec<RunRow>>) -> Vec<String> {
     let mut campaigns = BTreeSet::new();
     let mut models = BTreeSet::new();

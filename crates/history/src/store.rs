@@ -8,7 +8,6 @@ use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// SQLite application ID of history files: "mapr".
 const APPLICATION_ID: i32 = 0x6d61_7072;
 /// Version of the table layout.
 const LAYOUT: i32 = 1;
@@ -382,7 +381,6 @@ fn has_write_ahead_log(path: &Path) -> bool {
     read.is_ok() && header.last() == Some(&2)
 }
 
-/// Returns `None`, stored as NULL, for values that are not finite.
 fn finite(value: Option<f64>) -> Option<f64> {
     value.filter(|value| value.is_finite())
 }

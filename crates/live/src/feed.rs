@@ -28,7 +28,6 @@ pub(crate) struct State {
     campaign: String,
     pub(crate) units: DisplayUnits,
     pub(crate) lines: Vec<String>,
-    /// Expected points on the map.
     planned: Vec<Planned>,
     steps: usize,
     duration_s: f64,
@@ -127,7 +126,6 @@ pub(crate) struct Feed {
 
 struct FeedState {
     state: State,
-    /// Rows not yet sent to browsers.
     unsent: VecDeque<Vec<Option<f64>>>,
     last_tick: Option<Instant>,
     /// Excess of each step's actual duration over the planned one, s.
@@ -194,7 +192,6 @@ impl Feed {
         }
     }
 
-    /// The complete state.
     pub(crate) fn snapshot(&self) -> Arc<str> {
         let Ok(mut current) = self.current.lock() else { return Arc::from("{}") };
         self.update_operator_flags(&mut current.state);

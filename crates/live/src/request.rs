@@ -102,7 +102,6 @@ impl Access {
         request.origin.is_some() && request.origin == host_name
     }
 
-    /// Whether the browser reports that a page of another origin sent the request.
     pub(crate) fn is_of_another_page(&self, request: &Request) -> bool {
         request.origin.is_some() && !self.is_of_own_page(request)
     }

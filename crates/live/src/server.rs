@@ -125,7 +125,6 @@ fn page(stream: &mut impl Write, page: &str) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Sends the complete state, then every message, until one side disconnects.
 fn events(stream: &mut impl Write, served: &ServedContent, connection: &Connection) -> std::io::Result<()> {
     let Some(messages) = served.hub.join(connection.address, (served.snapshot)()) else {
         return plain(stream, "503 Service Unavailable");
@@ -158,7 +157,6 @@ struct OpenConnection {
     brief: Option<TcpStream>,
 }
 
-/// A connection, removed from the list when dropped.
 #[derive(Debug)]
 pub(crate) struct Connection {
     all: Arc<Connections>,
@@ -243,7 +241,6 @@ impl Hub {
         Some(receive)
     }
 
-    /// Sends a message; browsers that have gone or fall behind are removed.
     pub(crate) fn publish(&self, message: &Arc<str>) {
         if let Ok(mut clients) = self.clients.lock() {
             clients.retain(|(_, client)| client.try_send(message.clone()).is_ok());

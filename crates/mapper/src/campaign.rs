@@ -108,7 +108,6 @@ impl Campaign {
         Ok(Rehearsal { plan: plan_of(settings, &request)?, notes: Vec::new() })
     }
 
-    /// An error of a session with this campaign, at its place in the text if it has one.
     pub(crate) fn show(&self, error: SessionError) -> Error {
         show_in_campaign(error, self.text(), self.origin()).into()
     }

@@ -52,7 +52,6 @@ impl Recording {
     }
 }
 
-/// What the results need to know of the files.
 pub(crate) struct Described {
     machine: String,
     first_file: Option<PathBuf>,

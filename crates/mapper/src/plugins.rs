@@ -35,7 +35,6 @@ pub fn plugins() -> Registry {
     }
 }
 
-/// A suspected effect, written in rhai.
 fn read_effect(path: &Path) -> Result<Arc<dyn Effect>, Box<dyn std::error::Error + Send + Sync>> {
     let text = mapper_campaign::read_text(path).map_err(|source| SessionError::File {
         action: "read",
@@ -60,7 +59,6 @@ fn private_state_directory() -> Option<PathBuf> {
         .or_else(|| variable("HOME").map(|home| home.join(".local/state/mapper")))
 }
 
-/// Starts the driver of a campaign, a separate program.
 fn start_driver(name: &str, settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let built_in = BACKENDS.iter().map(|plugin| plugin.name).collect::<Vec<_>>().join(", ");
     let known = INCLUDED_DRIVERS.iter().find(|(known, ..)| *known == name);

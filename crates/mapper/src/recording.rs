@@ -104,7 +104,6 @@ impl Recording {
         self.parts().iter().flat_map(|part| &part.read.warnings).map(ToString::to_string).collect()
     }
 
-    /// The parts with a given campaign in place of their own.
     pub(crate) fn described_by(&self, campaign: Option<&Campaign>) -> Result<Vec<Recorded>, SessionError> {
         let given = campaign.map(Campaign::settings);
         // Which steps of a resumed run count depends on the campaign.
@@ -118,7 +117,6 @@ impl Recording {
         Ok(self.parts().iter().map(described).collect())
     }
 
-    /// The only part, with this campaign.
     pub(crate) fn only_part(&self, campaign: &Campaign) -> Result<Recorded, SessionError> {
         let mut parts = self.described_by(Some(campaign))?;
         match parts.len() {

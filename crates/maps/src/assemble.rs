@@ -83,7 +83,6 @@ pub fn line(speed_corrected_rpm: f64, mut points: Vec<MapPoint>) -> SpeedLine {
     SpeedLine { speed_corrected_rpm, speed_spread_rpm, target_speed_rpm: None, points }
 }
 
-/// Converts a point to the speed of its line by similarity.
 pub(crate) fn move_to_speed(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
     let (flow_kg_s, pressure_ratio) = (point.flow_corrected_kg_s, point.pressure_ratio);
     let shift_rpm = line_speed_rpm - point.speed_corrected_rpm;

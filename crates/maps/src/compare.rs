@@ -55,7 +55,6 @@ impl PlaceComparison {
     }
 }
 
-/// Whether the 95 % interval of a difference excludes 0.
 pub(crate) fn excludes_zero(difference: f64, standard_error: f64) -> bool {
     let (low, high) = confidence_interval_95(difference, standard_error);
     low > 0.0 || high < 0.0
@@ -174,7 +173,6 @@ struct NearestDeviation<'a> {
     pressure_ratio_difference: f64,
     distance_ratio: f64,
     eta_difference: f64,
-    /// Node of the first line just before the place.
     before: &'a FittedNode,
 }
 

@@ -99,7 +99,6 @@ struct Grid {
 struct Signal {
     channel: Channel,
     values: Vec<f64>,
-    /// Sums of the values before each grid point.
     sums: Vec<f64>,
     sigma: f64,
     min_jump_ratio: f64,
@@ -154,7 +153,6 @@ impl Grid {
         Grid { interval_s, t_s, signals }
     }
 
-    /// Number of grid points in a time, at least two.
     fn point_count(&self, time_s: f64) -> usize {
         ((time_s / self.interval_s).round() as usize).max(2)
     }

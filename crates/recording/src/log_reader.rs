@@ -20,7 +20,6 @@ const LOG_ZERO_NS: u64 = 1 << 62;
 #[derive(Debug, Default)]
 pub(crate) struct LogContent {
     pub(crate) builders: BTreeMap<MappedQuantity, SeriesBuilder>,
-    /// Ambient pressure, Pa.
     pub(crate) ambient: Option<SeriesBuilder>,
     pub(crate) ambient_unit: Option<&'static Unit>,
     pub(crate) units: BTreeMap<MappedQuantity, &'static Unit>,
@@ -29,7 +28,6 @@ pub(crate) struct LogContent {
     pub(crate) start_time_ns: Option<u64>,
     pub(crate) warnings: Vec<ReadWarning>,
     pub(crate) averaged: bool,
-    /// Number of stored values.
     kept: u64,
 }
 

@@ -15,7 +15,6 @@ use zstd::zstd_safe::{DCtx, ResetDirective, get_error_name};
 /// Start of every MCAP file.
 pub(crate) const MAGIC: &[u8] = mcap::MAGIC;
 
-/// Reads fields off the front of a body.
 pub(crate) struct Body<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Body<'a> {
@@ -69,7 +68,6 @@ pub(crate) struct ChannelDefinition {
     pub(crate) topic: String,
     pub(crate) encoding: String,
     pub(crate) metadata: BTreeMap<String, String>,
-    /// Content of the schema; empty if there is none.
     pub(crate) schema: Vec<u8>,
 }
 
@@ -170,16 +168,12 @@ fn parse_frame(bytes: &[u8]) -> Option<(u8, u64)> {
     Some((*opcode, u64::from_le_bytes(*rest.first_chunk()?)))
 }
 
-/// Receives the content of a recording.
 pub(crate) trait Sink: Sync {
     type SinkMessage: Send;
-    /// A topic, before its first message.
     fn define(&mut self, definition: &ChannelDefinition);
     /// Reads a message on a defined topic; `None` if the topic is not wanted. Several are read in parallel.
     fn read(&self, channel_id: u16, data: &[u8]) -> Option<Self::SinkMessage>;
-    /// Receives the content of a message, in the order of the file.
     fn take(&mut self, channel_id: u16, log_time_ns: u64, content: Self::SinkMessage);
-    /// A metadata record.
     fn metadata(&mut self, name: String, pairs: BTreeMap<String, String>);
     fn attachment(&mut self, name: String, data: &[u8]);
     fn value_count(&self) -> u64;
@@ -284,7 +278,6 @@ fn parse(raw: &str) -> FieldValue {
     }
 }
 
-/// Finds a key among the names.
 struct KeySeed<'a> {
     names: &'a [String],
     expected: usize,
@@ -367,7 +360,6 @@ impl Unpacker {
         Unpacker { context: DCtx::create(), content: Vec::new() }
     }
 
-    /// The records of a chunk.
     pub(crate) fn unpack(&mut self, body: &[u8], limit: u64) -> Result<&[u8], ChunkError> {
         let (claimed, saved, compression, data) = parse_header(body).ok_or(ChunkError::Header)?;
         if claimed > limit {
@@ -443,14 +435,11 @@ pub(crate) enum Item<T> {
     Cut,
 }
 
-/// A chunk of a batch.
 pub(crate) struct UnpackedChunk<T> {
-    /// Its offset in the file.
     pub(crate) offset: u64,
     pub(crate) items: Result<Vec<Item<T>>, ChunkError>,
 }
 
-/// Chunks that are unpacked together.
 #[derive(Default)]
 pub(crate) struct Batch {
     chunks: Vec<(u64, Vec<u8>)>,

@@ -236,7 +236,6 @@ fn report(
     })
 }
 
-/// Names in the map that the recording does not contain.
 fn find_missing_fields(
     map: &ChannelMap,
     builders: &BTreeMap<MappedQuantity, SeriesBuilder>,
@@ -364,7 +363,6 @@ fn drop_bad_readings(
     }
 }
 
-/// Steps from jumps of commands and measured channels.
 fn detect_steps(
     map: &ChannelMap,
     series: &mut BTreeMap<Channel, Series>,

@@ -20,7 +20,6 @@ const MAX_DEFINITIONS_BYTES: usize = 64 << 20;
 /// Number of damaged chunks and records that are listed; further ones are only counted. Bound: memory; further ones are only counted.
 const MAX_LISTED_DAMAGE: u64 = 100;
 
-/// Results of a pass in addition to the forwarded data.
 #[derive(Default)]
 pub(crate) struct ScanResult {
     pub(crate) warnings: Vec<ReadWarning>,
@@ -137,7 +136,6 @@ impl ScanResult {
         }
     }
 
-    /// Whether this many bytes of definitions still fit.
     fn has_room(&mut self, bytes: usize) -> bool {
         let together = self.defined_bytes.saturating_add(bytes);
         let fits = together <= MAX_DEFINITIONS_BYTES;
@@ -147,7 +145,6 @@ impl ScanResult {
         fits
     }
 
-    /// Chunks that are read in parallel.
     fn batch<S: Sink>(&mut self, batch: &mut Batch, options: &ReadOptions, sink: &mut S) {
         let known = |channel_id| self.definitions.contains_key(&channel_id);
         for UnpackedChunk { offset, items } in batch.open(sink, known, options.max_chunk_bytes) {

@@ -89,13 +89,11 @@ pub fn score(truth: &Truth, steps: &[StepMarker], points: Vec<IdentifiedPoint>) 
     points.into_iter().map(scored).collect()
 }
 
-/// Truth at the last sample at or before `t_s`.
 fn truth_at(truth: &Truth, t_s: f64) -> Option<PointTruth> {
     let value = |name: &str| true_value(truth, t_s, name);
     Some(PointTruth { eta: value("eta")?, h_w_m2k: value("h_w_m2k")? })
 }
 
-/// A true quantity at the last sample at or before `t_s`.
 fn true_value(truth: &Truth, t_s: f64, name: &str) -> Option<f64> {
     let index = truth.t_s.partition_point(|sample_s| *sample_s <= t_s).checked_sub(1)?;
     truth.column(name)?.get(index).copied().filter(|value| value.is_finite())

@@ -135,7 +135,10 @@ pub(crate) fn find_steps(
         // Without a command: what the rig reached.
         let value = |command: Option<&Series>, channel: Channel| match command {
             Some(command) => held_number(command, settled_s),
-            None => median_number(series.get(&channel)?, 0.5 * (start_s + end_s), end_s),
+            None => {
+                let later_half = series.get(&channel)?.slice(0.5 * (start_s + end_s), end_s).1;
+                median(later_half.iter().filter(|value| value.is_finite()))
+            }
         };
         StepMarker {
             index,
@@ -176,11 +179,6 @@ pub(crate) fn find_steps(
     steps
 }
 
-fn median_number(series: &Series, start_s: f64, end_s: f64) -> Option<f64> {
-    median(series.slice(start_s, end_s).1.iter().filter(|value| value.is_finite()))
-}
-
-/// First and last time of all samples, s.
 pub(crate) fn span_s(series: &BTreeMap<Channel, Series>) -> Option<(f64, f64)> {
     let first = series.values().filter_map(|s| s.t_s.first().copied()).reduce(f64::min)?;
     let last = series.values().filter_map(|s| s.t_s.last().copied()).reduce(f64::max)?;
@@ -206,7 +204,6 @@ pub(crate) fn hollow_steps(
     })
 }
 
-/// Start and end of each jump of the commands, s.
 fn command_jumps(p3: Option<&Series>, valve: Option<&Series>) -> Vec<(f64, f64)> {
     let p3_changes = p3.map(find_changes).unwrap_or_default();
     let valve_changes = valve.map(find_changes).unwrap_or_default();
@@ -255,7 +252,6 @@ fn last_before_s(series: &BTreeMap<Channel, Series>, change_s: f64) -> f64 {
     measured.filter_map(|(_, series)| before_s(series)).reduce(f64::max).unwrap_or(change_s)
 }
 
-/// A command that takes a new value.
 #[derive(Debug, Clone, Copy)]
 struct Change {
     t_s: f64,

@@ -85,20 +85,17 @@ impl Topic {
         Topic { name: STEP_TOPIC, schema, units }
     }
 
-    /// Messages of the rig and the runner.
     pub(crate) fn of_events() -> Topic {
         let (schema, units) = event_schema();
         Topic { name: EVENT_TOPIC, schema, units }
     }
 
-    /// Unusual provenance of readings.
     pub(crate) fn of_provenance() -> Topic {
         let (schema, units) = provenance_schema();
         Topic { name: PROVENANCE_TOPIC, schema, units }
     }
 }
 
-/// Run time, s, and message of a step's start or end.
 pub(crate) fn step_message(step: &StepMarker, phase: StepPhase) -> (f64, Value) {
     let (t_s, phase) = match phase {
         StepPhase::Start => (step.start_s, "start"),
@@ -266,7 +263,6 @@ pub(crate) fn add_channel(mcap: &mut McapFile, topic: &Topic) -> McapResult<u16>
     mcap.add_channel(schema_id, topic.name, "json", &topic.units)
 }
 
-/// The error of the system, or that of `mcap`.
 pub(crate) fn io_error(error: McapError) -> io::Error {
     match error {
         McapError::Io(source) => source,
@@ -298,7 +294,6 @@ pub(crate) struct ProvenanceWriter {
 }
 
 impl ProvenanceWriter {
-    /// The unusual provenance in a sample of a batch.
     pub(crate) fn message(&self, batch: &SampleBatch, index: usize) -> Option<serde_json::Value> {
         let t_s = *batch.t_s.get(index)?;
         let origin_of = |from: &mapper_core::Provenance| {
@@ -328,7 +323,6 @@ impl ProvenanceWriter {
     }
 }
 
-/// A parsed message; unknown channels are skipped.
 pub(crate) fn read_origins(data: &[u8]) -> Option<OriginMessage> {
     let message: BTreeMap<String, serde_json::Value> = serde_json::from_slice(data).ok()?;
     let known = message.into_iter().filter_map(|(symbol, value)| {

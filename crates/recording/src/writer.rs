@@ -17,14 +17,12 @@ use std::path::{Path, PathBuf};
 /// A topic of numeric fields in the file. All batches have the same topics: a schema for each batch would cost more than the samples.
 struct TopicLayout {
     topic: &'static str,
-    /// Names and units of the fields.
     fields: Vec<(String, String)>,
     channel_id: u16,
     /// Text before each value: `{"speed_rpm":`, then `,"flow_kg_s":` and so on.
     prefixes: Vec<Vec<u8>>,
 }
 
-/// Columns of one batch for one topic.
 struct Table<'a> {
     /// Position in the writer's layouts.
     layout: usize,
@@ -44,7 +42,6 @@ pub struct RecordingWriter {
     start_time_ns: u64,
     /// Whole second of the run's clock whose messages are not flushed yet.
     second: Option<i64>,
-    /// Time of the last sample written, flushed or not.
     last_sample_s: Option<f64>,
     saved_until_s: Option<f64>,
     failed: bool,

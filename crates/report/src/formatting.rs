@@ -53,7 +53,6 @@ impl Display {
         Display { units: units.clone() }
     }
 
-    /// The display unit of a kind; empty for a kind that is shown as it is.
     fn unit(&self, kind: Kind) -> &str {
         match kind {
             Kind::Speed => &self.units.speed,
@@ -180,7 +179,6 @@ pub fn duration(duration_s: f64) -> String {
     }
 }
 
-/// A number, or a dash if there is none.
 pub fn number(value: Option<f64>, decimals: usize) -> String {
     value
         .filter(|value| value.is_finite())

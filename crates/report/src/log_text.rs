@@ -101,7 +101,6 @@ fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> Table {
     table
 }
 
-/// The suggestion: channels with a remark, and the relations between channels.
 fn proposed_map(layout: &Layout, proposal: &Proposal) -> Document {
     let list = |names: Vec<&str>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
     let symbols_of = |certainty: Certainty| {

@@ -54,7 +54,6 @@ fn add_verdicts(document: &mut Document, map: &CompressorMap) {
     }
 }
 
-/// Adds the columns of a table with their ranges in `units`, if there are any.
 fn add_columns(document: &mut Document, columns: &[ImportedColumn], units: &str) {
     let row = |column: &ImportedColumn| {
         [
@@ -330,7 +329,6 @@ fn evidence_text(evidence: EndEvidence) -> &'static str {
     }
 }
 
-/// The contribution of each source to the efficiency: median and largest of all points.
 fn sources(budgets: &[PointBudgets]) -> Table {
     let rows = || budgets.iter().filter_map(|point| point.eta.as_ref()).flat_map(|budget| &budget.rows);
     let mut names: Vec<&str> = Vec::new();

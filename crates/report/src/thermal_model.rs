@@ -94,7 +94,6 @@ fn shared_value(value: &SharedValue, scale: f64, unit: &str, decimals: usize) ->
     }
 }
 
-/// The relation for h before the wheel, and whether the recording determines it, as one line without its end.
 fn inlet_text(inlet: &IdentifiedInlet) -> String {
     let law_name = |convection: InletConvection| match convection {
         InletConvection::Shared => "that behind it".to_owned(),

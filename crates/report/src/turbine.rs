@@ -17,7 +17,6 @@ const DEFINITION: &str = "The efficiency is turbine times mechanical efficiency,
      isentropic power of the gas from T3', which is T3 less the heat to the turbine housing before the wheel. Bearing friction is a loss in it: \
      separating the two takes the oil's flow and outlet temperature (m_oil, T_oil_out).";
 
-/// The turbine at all points, as a table by speed with a picture of its map.
 pub(crate) fn turbine_section(points: &[ScoredTurbinePoint], map: Option<&TurbineMap>) -> Document {
     let mut document = Document::default();
     if points.is_empty() {
@@ -80,7 +79,6 @@ pub(crate) fn turbine_section(points: &[ScoredTurbinePoint], map: Option<&Turbin
     document
 }
 
-/// Range and accuracy of the points in one sentence; `None` without an efficiency.
 pub(crate) fn summary_sentence(points: &[ScoredTurbinePoint]) -> Option<String> {
     let known = || points.iter().filter(|scored| scored.point.verdict != Verdict::Unusable);
     let etas: Vec<f64> = known().filter_map(|scored| scored.point.efficiency).collect();

@@ -188,7 +188,6 @@ impl NightlyRun {
         NightlyRun { campaign, model, machine, key }
     }
 
-    /// Plans, runs, records, identifies and scores. A failure becomes part of the row.
     pub(crate) fn run(&self, session: &Session<'_>, directory: &Path) -> Result<RunRow, SessionError> {
         let mut row = RunRow {
             key: self.key.clone(),
@@ -291,7 +290,6 @@ impl NightlyRun {
     }
 }
 
-/// The monitored metrics; those without a value are omitted.
 fn metrics(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f64> {
     let score = mapper_recording::score::summarise(points);
     let good = points.iter().filter(|scored| scored.point.verdict == Verdict::Good).count();
@@ -319,7 +317,6 @@ fn metrics(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f64> {
         .collect()
 }
 
-/// One row for each point; repeat visits are distinguished by their visit number.
 fn point_rows(points: &[ScoredPoint]) -> Vec<PointRow> {
     let mut visits: BTreeMap<(u64, u64), usize> = BTreeMap::new();
     points

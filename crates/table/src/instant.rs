@@ -243,7 +243,6 @@ fn date(text: &str, order: DateOrder) -> Option<i64> {
     civil_day(if year < 100 { year + 2000 } else { year }, month, day)
 }
 
-/// Days from 1970-01-01 to a date.
 fn civil_day(year: i64, month: i64, day: i64) -> Option<i64> {
     if !YEARS.contains(&year) {
         return None;

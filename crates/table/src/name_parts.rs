@@ -11,7 +11,6 @@ use Word::{
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-/// A part of a name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Token {
     Word(&'static [Word]),

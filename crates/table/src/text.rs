@@ -49,11 +49,6 @@ impl TextEncoding {
         if self.0 == WINDOWS_1252 { "Latin-1" } else { self.0.name() }
     }
 
-    /// Whether the encoding is UTF-8.
-    pub fn is_utf8(self) -> bool {
-        self.0 == UTF_8
-    }
-
     /// Whether the encoding is a form of UTF-16.
     pub fn is_utf16(self) -> bool {
         [UTF_16LE, UTF_16BE].contains(&self.0)
@@ -177,7 +172,7 @@ impl TextRows {
         let mark = u64::try_from(dialect.mark).unwrap_or(0);
         // An error in the mark appears at the first line.
         drop(io::copy(&mut bytes.by_ref().take(mark), &mut io::sink()));
-        let text: Box<dyn Read> = match dialect.encoding.is_utf8() {
+        let text: Box<dyn Read> = match dialect.encoding.0 == UTF_8 {
             true => bytes,
             false => Box::new(DecodingReader::new(bytes, dialect.encoding.decoder())),
         };

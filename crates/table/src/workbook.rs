@@ -34,7 +34,6 @@ pub enum Book<R> {
     Xls(Vec<Sheet>),
 }
 
-/// The next cell with its row and column.
 type NextCell<'a> = Box<dyn FnMut() -> Result<Option<(u32, usize, Value)>, String> + 'a>;
 
 impl<R: Read + Seek> Book<R> {
@@ -103,7 +102,6 @@ impl<R: Read + Seek> Book<R> {
 /// The rows of a sheet; rows without any cell are skipped.
 pub struct SheetRows<'a> {
     cells: NextCell<'a>,
-    /// The first cell of the next row.
     next: Option<(u32, usize, Value)>,
     row: Vec<Value>,
     at: usize,

@@ -46,7 +46,6 @@ struct Globals {
     has_flags: bool,
     from_1904: bool,
     strings: Vec<Rc<str>>,
-    /// Whether each format of a cell is one of dates.
     is_date: Vec<bool>,
     /// Position, name and whether it is hidden.
     sheets: Vec<(usize, String, bool)>,
@@ -282,7 +281,6 @@ const RICH: u8 = 0x08;
 /// Set if phonetic data follow the characters.
 const EXTENDED: u8 = 0x04;
 
-/// Bytes in one record and those that continue it.
 struct Bytes<'a> {
     pieces: Vec<&'a [u8]>,
     piece: usize,

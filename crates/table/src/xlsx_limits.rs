@@ -158,7 +158,6 @@ struct PieceChecker {
     read: Rc<Cell<u64>>,
     piece: Rc<Cell<u64>>,
     buffer: u64,
-    /// What is left of the memory, bytes.
     memory: Rc<Cell<u64>>,
 }
 
@@ -223,7 +222,6 @@ impl PieceChecker {
         Ok(())
     }
 
-    /// The declared number of shared strings, for which the library reserves memory.
     fn declared_strings(&self, tag: &BytesStart<'_>, before: u64) -> Result<u64, String> {
         if self.kind != Kind::SharedStrings || tag.local_name().as_ref() != "sst" {
             return Ok(before);

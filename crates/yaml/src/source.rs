@@ -192,7 +192,7 @@ impl Findings {
 
     /// The notes about a text, in the order of the text.
     pub fn new(source: Source, notes: Notes) -> Self {
-        let (mut list, overflow) = notes.into_parts();
+        let Notes { mut list, overflow } = notes;
         list.sort_by_key(|finding| finding.span.start);
         let omitted = list.len().saturating_sub(Self::LIMIT) + overflow;
         list.truncate(Self::LIMIT);
@@ -257,10 +257,6 @@ impl Notes {
     /// The findings, in the order of the checks.
     pub fn list(&self) -> &[Finding] {
         &self.list
-    }
-
-    fn into_parts(self) -> (Vec<Finding>, usize) {
-        (self.list, self.overflow)
     }
 }
 

@@ -92,7 +92,6 @@ fn read_own(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, 
 /// The column that only files of `mapper` have.
 const OWN_COLUMN: &str = "line_speed_corrected_rpm";
 
-/// Whether a text is a file of `mapper` with all its columns.
 fn is_own(text: &str) -> bool {
     let heading = text.lines().find(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
     heading.is_some_and(|line| line.split(',').any(|name| name.trim() == OWN_COLUMN))

@@ -51,7 +51,6 @@ fn rows<'a>(text: &mut String, coordinates: &[f64], values: impl IntoIterator<It
     }
 }
 
-/// A number and its values, on as many lines as necessary.
 fn row(text: &mut String, first: String, values: &[f64]) {
     let words: Vec<String> = std::iter::once(first).chain(values.iter().map(f64::to_string)).collect();
     for line in words.chunks(NUMBERS_PER_LINE) {

@@ -87,13 +87,11 @@ fn read(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError
     read_text(&text, given)
 }
 
-/// A matrix of numbers, column by column.
 struct Matrix {
     name: String,
     rows: Vec<f64>,
 }
 
-/// The matrices of a file up to the first that is not of level 4.
 fn matrices(mut bytes: &[u8]) -> Vec<Matrix> {
     let mut found = Vec::new();
     while let Some((header, rest)) = bytes.split_at_checked(20) {
@@ -114,7 +112,6 @@ fn matrices(mut bytes: &[u8]) -> Vec<Matrix> {
     found
 }
 
-/// Appends a matrix, given by its rows of equal length.
 fn matrix(file: &mut Vec<u8>, name: &str, kind: u32, rows: &[Vec<f64>]) {
     let columns = rows.first().map_or(0, Vec::len);
     // A map has some thousand numbers.

@@ -21,7 +21,6 @@ pub(crate) struct SimulationTable {
     pub flow_kg_s: Vec<Vec<f64>>,
     pub pressure_ratio: Vec<Vec<f64>>,
     pub eta: Vec<Vec<f64>>,
-    /// Speeds of the extrapolated lines, rpm.
     pub extrapolated_rpm: Vec<f64>,
 }
 
@@ -97,7 +96,6 @@ pub(crate) fn joined(values: &[f64], separator: &str) -> String {
 /// Start of the comment that names the gas.
 pub(crate) const GAS_PREFIX: &str = "compressed gas: ";
 
-/// Comment lines that begin with `mark`.
 pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
     let (t_ref_k, p_ref_pa) = (map.reference.t_ref_k, map.reference.p_ref_pa);
     let mut text = format!(
@@ -132,7 +130,6 @@ pub(crate) fn digits(value: Option<f64>) -> String {
     value.map(number).unwrap_or_default()
 }
 
-/// A speed in the displayed unit, without needless digits.
 pub(crate) fn speed(speed_rpm: f64, units: &MapUnits) -> String {
     label(speed_rpm * units.speed_of_one_rpm)
 }

@@ -52,12 +52,10 @@ impl Instance {
 
 #[derive(Default)]
 struct Contents {
-    /// Names of binary files by their identifiers.
     files: HashMap<String, String>,
     /// Type and base names of the attributes of each element of the application model.
     elements: HashMap<String, (String, HashMap<String, String>)>,
     columns: Vec<Instance>,
-    /// By their identity.
     matrices: HashMap<String, Instance>,
     quantities: HashMap<String, Instance>,
     units: HashMap<String, Instance>,
@@ -118,7 +116,6 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     column_log(file, (NAME, "submatrix"), tables.collect(), problems, options)
 }
 
-/// Reads the file once.
 fn contents(file: &LogFile) -> Result<Contents, String> {
     let mut xml = Reader::from_reader(BufReader::new(file.open().map_err(|error| error.to_string())?));
     let (mut found, mut path, mut text) = (Contents::default(), Vec::<String>::new(), String::new());
@@ -155,7 +152,6 @@ fn contents(file: &LogFile) -> Result<Contents, String> {
 
 #[derive(Default)]
 struct Element {
-    /// Texts of the innermost group, by their tags.
     tags: HashMap<String, String>,
     /// Of an element of the application model.
     attributes: HashMap<String, String>,
@@ -165,7 +161,6 @@ struct Element {
 }
 
 impl Element {
-    /// Processes the end of the last element of `path`, with its text.
     fn end(&mut self, path: &[String], text: &str, found: &mut Contents) {
         let path: Vec<&str> = path.iter().map(String::as_str).collect();
         match path.as_slice() {
@@ -250,7 +245,6 @@ fn instant_of_digits(text: &str) -> Option<Instant> {
     parse_instant(&format!("{year}-{month}-{day} {hour}:{minute}:{second}.{fraction}"), DateOrder::YearFirst)
 }
 
-/// The binary files next to a file.
 struct Binaries<'a> {
     file: &'a LogFile,
     contents: &'a Contents,
@@ -259,7 +253,6 @@ struct Binaries<'a> {
 }
 
 impl Binaries<'_> {
-    /// The values of a column with that many rows.
     fn chunk(&mut self, column: &Instance, rows: Option<usize>) -> Result<Chunk, String> {
         let written = match column.values.get("values") {
             Some(Values::Instants(instants)) => return Ok(Chunk::Instants(instants.clone())),
@@ -297,7 +290,6 @@ impl Binaries<'_> {
         Ok(Chunk::Numbers(values))
     }
 
-    /// Reserves memory for the values of that many rows.
     fn reserve(&mut self, rows: Option<usize>) -> Result<usize, String> {
         let rows = rows.ok_or("its number of rows is missing")?;
         let bytes = u64::try_from(rows).unwrap_or(u64::MAX).saturating_mul(VALUE_BYTES);
@@ -337,7 +329,6 @@ impl Binaries<'_> {
         values.ok_or_else(|| format!("its binary file ends early, or has values of the type `{datatype}`"))
     }
 
-    /// The content of a binary file in the folder of the file.
     fn binary(&mut self, identifier: &str) -> Result<&[u8], String> {
         // Some programs write the file name instead of the identifier.
         let name = self.contents.files.get(identifier).map_or(identifier, String::as_str);
@@ -359,7 +350,6 @@ impl Binaries<'_> {
     }
 }
 
-/// Decodes the number at the start of the bytes.
 fn decode(bytes: &[u8], datatype: &str) -> Option<f64> {
     let (kind, is_big) = datatype.strip_suffix("_beo").map_or((datatype, false), |kind| (kind, true));
     let integer = |size: usize| {

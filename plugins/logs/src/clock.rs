@@ -10,7 +10,6 @@ use mapper_table::{DateOrder, NS_PER_DAY, header_unit, read_number};
 /// Maximum number of rows of a table in its sample.
 pub(crate) const HEAD_ROWS: usize = 400;
 
-/// The first rows of data.
 pub(crate) struct Sample<'a> {
     pub(crate) columns: &'a [HeadColumn],
     pub(crate) rows: &'a [Vec<String>],
@@ -177,16 +176,12 @@ pub(crate) struct GroupClock {
     pub(crate) zero_ns: i64,
     /// Set if several rows share one reading.
     pub(crate) spread: Option<Spread>,
-    /// Whether rows are out of order and must be sorted by time.
     pub(crate) disordered: bool,
 }
 
-/// Rows that share a reading of the clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Spread {
-    /// Seconds between them.
     pub(crate) interval_s: f64,
-    /// Their number.
     pub(crate) rows: usize,
     /// Number of rows missing at the first reading, since the log began within it.
     pub(crate) missing_at_start: usize,
@@ -202,7 +197,6 @@ impl Clock {
         }
     }
 
-    /// Nanoseconds of a date or a time of day.
     pub(crate) fn instant_ns(&self, cells: &dyn Cells) -> Option<i64> {
         let Clock::Instant { date, time, order, .. } = self else { return None };
         let mut instant = cells.instant(*time, *order)?;
@@ -212,7 +206,6 @@ impl Clock {
         Some(instant.ns())
     }
 
-    /// Columns of the clock; a date may have its own column next to the time of day.
     pub(crate) fn columns(&self) -> Vec<usize> {
         match self {
             Clock::Count { column, .. } => vec![*column],
@@ -236,7 +229,6 @@ pub(crate) struct ClockReader {
     last_ns: Option<i64>,
     last_s: f64,
     shared: usize,
-    /// Whether a reading with a date went back by an hour.
     has_hour_back: bool,
 }
 

@@ -29,7 +29,6 @@ const MIN_ROWS_PER_RESTART: usize = 20;
 /// Maximum number of clocks in a table; further columns with clock names are data.
 const MAX_CLOCKS: usize = 100;
 
-/// A candidate clock, and its readings in the first rows, s.
 #[derive(Debug, Clone)]
 struct Candidate {
     clock: Clock,
@@ -63,7 +62,6 @@ impl Candidate {
         is_running || self.is_disordered()
     }
 
-    /// Number of readings below the previous one.
     fn reversal_count(&self) -> usize {
         let readings: Vec<f64> = self.present().collect();
         readings.windows(2).filter(|pair| pair[1] < pair[0]).count()
@@ -98,7 +96,6 @@ impl Candidate {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether the other has readings in the same rows at the same pace.
     fn has_pace_of(&self, other: &Candidate) -> bool {
         let tolerance_s = 1.01 * self.resolution_s().max(other.resolution_s()).min(60.0);
         self.readings_s.iter().zip(&other.readings_s).all(|pair| match pair {
@@ -234,7 +231,6 @@ fn finest_clock<'a>(group: &[&'a Candidate]) -> &'a Candidate {
     best
 }
 
-/// The rows that share a reading, if several do.
 fn spread(candidate: &Candidate) -> Option<Spread> {
     let readings: Vec<f64> = candidate.present().collect();
     let runs: Vec<&[f64]> = readings.chunk_by(|a, b| a == b).collect();
@@ -365,7 +361,6 @@ fn order_of(column: usize, sample: &Sample<'_>) -> (DateOrder, bool) {
     guess_order(cells(column, sample))
 }
 
-/// Share of cells with dates or times.
 fn instant_share(column: usize, sample: &Sample<'_>, order: DateOrder) -> f64 {
     let (mut instants, mut all) = (0.0, 0.0);
     for cell in cells(column, sample) {
@@ -380,7 +375,6 @@ fn instant_share(column: usize, sample: &Sample<'_>, order: DateOrder) -> f64 {
     if all > 0.0 { instants / all } else { 0.0 }
 }
 
-/// Whether its cells contain a date, and a time of day.
 fn date_and_time_in(column: usize, sample: &Sample<'_>, order: DateOrder) -> (bool, bool) {
     let first = cells(column, sample).find_map(|cell| parse_instant(cell, order)).unwrap_or_default();
     (first.day.is_some(), first.ns_of_day.is_some())

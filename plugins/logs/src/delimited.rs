@@ -50,7 +50,6 @@ struct Delimited {
     file: LogFile,
     dialect: Dialect,
     table: Table,
-    /// Set if the table is in long form.
     long: Option<LongForm>,
 }
 

@@ -102,7 +102,6 @@ impl MdfSource {
         Ok(Arc::new(MdfSource { inner, unpacked: Mutex::default() }))
     }
 
-    /// Counts a packed block once.
     fn count(&self, offset: u64, unpacked_bytes: u64) -> MdfResult<()> {
         let refused = |limit: u64| {
             Mf4Error::Decompression(format!(
@@ -147,13 +146,11 @@ impl ByteSource for MdfSource {
     }
 }
 
-/// The stated unpacked size of a packed block, bytes.
 fn packed_size(bytes: &[u8]) -> Option<u64> {
     let size = bytes.get(32..40).filter(|_| bytes.starts_with(b"##DZ") && bytes.len() >= PACKED_HEADER)?;
     Some(u64::from_le_bytes(size.try_into().ok()?))
 }
 
-/// Start of the text of a block that may contain a formula.
 fn text_start(bytes: &[u8]) -> Option<usize> {
     let is_text = bytes.starts_with(b"##TX") && bytes.len() > HEADER;
     let kind = bytes.get(42..44).filter(|_| bytes.starts_with(b"CC") && bytes.len() > CONVERSION_HEADER);

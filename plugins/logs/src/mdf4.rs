@@ -143,7 +143,6 @@ fn describe_clock(clock: &Channel) -> String {
     if unit.is_empty() { format!("`{}`", clock.name) } else { format!("`{}`, counts {unit}", clock.name) }
 }
 
-/// Makes the names of groups distinct; a single group has none.
 fn number_group_names(layout: &mut Layout) {
     if let [only] = layout.groups.as_mut_slice() {
         only.name = String::new();

@@ -15,7 +15,6 @@ pub(crate) struct TableHead {
     pub(crate) data_row: usize,
     /// Unit after each number of a column, if the cells have one.
     pub(crate) cell_units: BTreeMap<usize, String>,
-    /// The rows of the head, and further findings.
     pub(crate) findings: Vec<LogFinding>,
 }
 
@@ -151,11 +150,9 @@ struct HeadRows<'a> {
     group_row: Option<usize>,
     header: &'a [usize],
     data_row: usize,
-    /// Number of repeated names.
     repeated: usize,
 }
 
-/// The rows of the head, and further findings about it.
 fn findings(found: &HeadRows<'_>, columns: &[HeadColumn], cell_units: usize) -> Vec<LogFinding> {
     let has_units = columns.iter().any(|column| column.unit.is_some());
     let mut findings = vec![LogFinding::Header {
@@ -234,7 +231,6 @@ fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// The rows without the comment sign at the start of the header: `# time, p2`, `% t`, `// t`.
 fn without_comment_signs(rows: &[Vec<String>], data_row: usize, length: usize) -> Vec<Vec<String>> {
     let mut rows = rows.to_vec();
     for row in rows.iter_mut().take(data_row) {
@@ -264,7 +260,6 @@ fn group_row(rows: &[Vec<String>], header: &[usize], length: usize) -> Option<us
     (groups && words && cells.len() <= length && 2 * filled.len() < length).then_some(row)
 }
 
-/// The last row of units above `before` that is as long as the table.
 fn distant_units_row(rows: &[Vec<String>], before: usize, length: usize) -> Option<usize> {
     let filled = |row: &[String]| row.iter().filter(|cell| !cell.is_empty()).count();
     (0..before.min(rows.len())).rev().find(|row| {
@@ -273,7 +268,6 @@ fn distant_units_row(rows: &[Vec<String>], before: usize, length: usize) -> Opti
     })
 }
 
-/// The unit after the numbers of a column; `None` if there is none, or more than one.
 fn unit_in_cells(rows: &[Vec<String>], column: usize, decimal: u8) -> Option<String> {
     let cells = rows.iter().filter_map(|row| row.get(column)).filter(|cell| !is_missing(cell.as_bytes()));
     let (mut unit, mut with, mut all) = (None, 0usize, 0usize);
@@ -353,7 +347,6 @@ fn first_data_row(rows: &[Vec<String>], length: usize, decimal: u8) -> Option<us
     })
 }
 
-/// Whether nearly all rows of data have a number or a time in a column.
 fn is_value_column(rows: &[Vec<String>], data: &[bool], column: usize, decimal: u8) -> bool {
     let cells = rows.iter().zip(data).filter(|(_, is)| **is).filter_map(|(row, _)| row.get(column));
     let (mut values, mut all) = (0usize, 0usize);

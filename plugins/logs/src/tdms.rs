@@ -142,7 +142,6 @@ fn failed(file: &LogFile, error: &TdmsError) -> LogError {
     file.content_error(NAME, error.to_string())
 }
 
-/// A name without its quotes.
 fn unquoted(name: &str) -> String {
     name.trim_matches('\'').replace("''", "'")
 }
@@ -236,7 +235,6 @@ fn analyse_table(
     Ok(Ok(table))
 }
 
-/// Names, and units if any is known.
 fn head(channels: &[Channel]) -> Vec<Vec<String>> {
     let names = channels.iter().map(|channel| channel.path.channel_name().to_owned()).collect();
     if channels.iter().all(|channel| channel.unit.is_empty()) {

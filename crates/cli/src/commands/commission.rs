@@ -108,7 +108,6 @@ impl Commission {
         Ok(())
     }
 
-    /// Puts the values into the campaign file, and shows the changed lines.
     fn write(&self, text: &str, values: &[(&str, &str, String)], as_json: bool) -> Result<(), Failure> {
         let path = &self.campaign;
         let changed = with_actuators(text, path, values)

@@ -44,7 +44,6 @@ fn parse_metric(text: &str) -> Result<Metric, String> {
     })
 }
 
-/// Parses a day; returns its start in UTC.
 fn parse_day(text: &str) -> Result<jiff::Timestamp, String> {
     let day: jiff::civil::Date = text.parse().map_err(|error| format!("{error}; write e.g. 2026-11-21"))?;
     let midnight = day.to_zoned(jiff::tz::TimeZone::UTC).map_err(|error| error.to_string())?;

@@ -109,7 +109,6 @@ impl Init {
     }
 }
 
-/// Asks for the wheel diameter on a terminal.
 fn ask_wheel_diameter_m() -> Result<f64, Failure> {
     let missing = |why: &str| Failure::new(Code::BadInput, format!("{why}; give it with `--wheel 60mm`"));
     if !std::io::stdin().is_terminal() {

@@ -103,7 +103,6 @@ impl Plan {
         standard_output::show(&document)
     }
 
-    /// Rehearses a script and prints the forecast plan.
     fn run_script(
         &self,
         session: &Session<'_>,

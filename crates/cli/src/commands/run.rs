@@ -218,7 +218,6 @@ impl Run {
     }
 }
 
-/// The failure of a run that did not complete.
 pub(crate) fn ending_failure(ending: &RunEnding) -> Option<Failure> {
     const KEPT: &str = "the rig is safe and the recording is kept";
     Some(match ending {

@@ -143,7 +143,6 @@ impl Failure {
 /// Maximum length of a message, characters: a file could put thousands of names into one.
 const MAX_MESSAGE_CHARS: usize = 4000;
 
-/// Shortens a message to a few screens.
 fn shorten(message: &str) -> String {
     match message.char_indices().nth(MAX_MESSAGE_CHARS) {
         None => message.to_owned(),

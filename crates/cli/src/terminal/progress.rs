@@ -297,12 +297,10 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
 /// Maximum number of lines about finished pieces.
 const PIECES_LINES: usize = 200;
 
-/// Whether this number of finished pieces is printed.
 fn is_printed(done: usize, of: usize) -> bool {
     done == of || done.is_multiple_of(of.div_ceil(PIECES_LINES).max(1))
 }
 
-/// The current work, its share of the whole and the estimated time remaining, once they are known.
 fn progress_line(what: &str, done_ratio: f64, elapsed_s: f64) -> String {
     if !(done_ratio > 0.0 && done_ratio < 1.0) {
         return what.to_owned();
@@ -311,7 +309,6 @@ fn progress_line(what: &str, done_ratio: f64, elapsed_s: f64) -> String {
     format!("{:3.0} %  {what}, {} left", 100.0 * done_ratio, short_duration(left_s))
 }
 
-/// Number of finished pieces, elapsed time, and the estimated time remaining.
 fn pieces_line(done: usize, of: usize, elapsed_s: f64) -> String {
     match done {
         0 => format!("0 of {of} done"),

@@ -112,7 +112,6 @@ pub(crate) struct PlaceError {
     pub eta: f64,
 }
 
-/// A line with the covariance of its parameters.
 pub(crate) struct LineErrors {
     frame: FlowFrame,
     parameters: Parameters,
@@ -130,7 +129,6 @@ impl LineErrors {
         }
     }
 
-    /// Errors at an angle of the line, rad.
     pub(crate) fn at(&self, angle_rad: f64, scales: Scales) -> PlaceError {
         let at = |shape: &LineShape, angle: f64| {
             let place = shape.physical(angle, self.speed_ratio);
@@ -204,7 +202,6 @@ impl Default for MapFitOptions {
     }
 }
 
-/// The table without the errors at left-out lines.
 pub(crate) fn table(fit: &MapFit, options: &MapFitOptions) -> Result<FittedMap, MapFitError> {
     let (lowest_rpm, highest_rpm) = fit.speed_bounds_rpm();
     let measured = &fit.data.lines_rpm;
@@ -253,7 +250,6 @@ struct LineEndAngles {
     /// Spline of the smooth surge-side end, with its knot values.
     spline: SpeedSpline,
     surge: DVector<f64>,
-    /// For each measured line.
     measured: Vec<MeasuredEnds>,
 }
 
@@ -337,11 +333,6 @@ impl LineEndAngles {
     }
 }
 
-/// Lowest pressure ratio of a line: below 1 by a share of the line's pressure rise.
-fn lowest_pressure_ratio(highest_ratio: f64) -> f64 {
-    (1.0 - LOWEST_SHARE * (highest_ratio - 1.0)).clamp(MIN_LOWEST_RATIO, 1.0)
-}
-
 fn line_nodes(fit: &MapFit, ends: &LineEndAngles, speed_corrected_rpm: f64, count: usize) -> Vec<FittedNode> {
     let speed_ratio = fit.speed_ratio(speed_corrected_rpm);
     let shape = fit.solution.shape(speed_ratio);
@@ -405,7 +396,8 @@ fn line_nodes(fit: &MapFit, ends: &LineEndAngles, speed_corrected_rpm: f64, coun
 fn choke_end(shape: &LineShape, speed_ratio: f64, surge_rad: f64) -> f64 {
     let ratio = |angle: f64| shape.physical(angle, speed_ratio).pressure_ratio;
     let top = ratio(surge_rad.min(std::f64::consts::FRAC_PI_2)).max(ratio(surge_rad));
-    let wanted = lowest_pressure_ratio(top);
+    // Below 1 by a share of the line's pressure rise.
+    let wanted = (1.0 - LOWEST_SHARE * (top - 1.0)).clamp(MIN_LOWEST_RATIO, 1.0);
     if ratio(MIN_ANGLE_RAD) > wanted {
         return MIN_ANGLE_RAD;
     }

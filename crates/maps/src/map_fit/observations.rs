@@ -53,7 +53,6 @@ const MAX_LINES: usize = 60;
 /// Maximum relative difference between the speeds of a surge mark and its line. Bound: less than half of the distance of lines.
 const MAX_MARK_SPEED_DIFFERENCE_RATIO: f64 = 0.03;
 
-/// One point.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Observation {
     /// Index of the line in [`Observations::lines`].
@@ -88,7 +87,6 @@ impl Observation {
 pub(crate) struct Observations {
     /// Unit of speed ratios, rpm.
     pub nominal_speed_rpm: f64,
-    /// Corrected speeds of the lines, rpm, rising.
     pub lines_rpm: Vec<f64>,
     pub points: Vec<Observation>,
     /// Errors common to all points, which the residuals do not show.
@@ -216,7 +214,6 @@ fn observation(
 /// Distance of half weight, in units of the nominal speed and of the line's maximum flow. Bound: the distance of neighbouring points.
 const HALF_WEIGHT_DISTANCE_RATIO: f64 = 0.1;
 
-/// Common errors of the points, with their positions.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CommonErrorField {
     points: Vec<Entry>,
@@ -229,7 +226,6 @@ struct Entry {
     common: CommonErrors,
 }
 
-/// Common standard errors at a place.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct PlaceCommonErrors {
     /// Of efficiency, fraction.

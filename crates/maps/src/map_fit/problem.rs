@@ -19,7 +19,6 @@ pub(crate) const ROBUST_SIGMAS: f64 = 3.0;
 /// make errors beyond the measured lines too small.
 pub(crate) const ROUGHNESS_PRECISION_RANGE: [f64; 2] = [0.03, 20.0];
 
-/// Variance components.
 pub(crate) struct Precisions {
     /// Precision of the roughness of each parameter over speed.
     pub(crate) rough: Parameters,
@@ -237,7 +236,6 @@ impl<'a> Problem<'a> {
         out
     }
 
-    /// Matrix of the penalty and its gradient.
     pub(crate) fn penalty(
         &self,
         unknowns: &Unknowns,
@@ -318,7 +316,6 @@ fn frame_of(data: &Observations) -> FlowFrame {
     FlowFrame { middle_kg_s, half_range_kg_s: (0.5 * (high - low)).max(MIN_RANGE_RATIO * high) }
 }
 
-/// Units of distance of a point's line.
 fn scales(point: &Observation) -> Scales {
     Scales { flow_kg_s: point.flow_scale_kg_s, ratio: point.ratio_scale }
 }

@@ -21,13 +21,9 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) struct Solution {
     pub splines: Splines,
     pub frame: FlowFrame,
-    /// Parameters at the knots.
     pub(crate) values: DMatrix<f64>,
-    /// Covariance of all unknowns, parameters first (parameter by parameter, knot by knot).
     pub(crate) covariance: DMatrix<f64>,
-    /// Variance of the roughness: the inverse of its penalty.
     roughness_variance: Parameters,
-    /// Widening of the errors beyond the measured speeds.
     pub(crate) widening: EndWidenings,
     /// Standard deviations of the line offsets, logarithms.
     pub line_scatter: [f64; 3],
@@ -39,7 +35,6 @@ pub(crate) struct Solution {
     deviance: f64,
     /// Highest efficiency of the fit at the points, fraction.
     pub best_eta: f64,
-    /// Angles of the feet, in the order of the points.
     pub angles_rad: Vec<f64>,
 }
 
@@ -142,16 +137,13 @@ const DAMPING: DampingRule = DampingRule {
 enum Start<'a> {
     /// From the points alone, with this scale of the residuals.
     Scale(f64),
-    /// From the result of another fit.
     Fit(&'a Solution),
 }
 
 enum Phase {
     /// Parameters with fixed starting variances.
     Free,
-    /// Estimation of the variances.
     Estimate,
-    /// Parameters with the estimated variances.
     Settle,
 }
 

@@ -367,12 +367,10 @@ impl Coordinate {
     }
 }
 
-/// A spline by its knots.
 #[derive(Debug, Clone)]
 pub(crate) struct SpeedSpline {
     coordinate: Coordinate,
     knots: Vec<f64>,
-    /// Second derivatives at the knots from the values there.
     second: DMatrix<f64>,
     /// Integral of the squared second derivative as a quadratic form of the values.
     pub penalty: DMatrix<f64>,
@@ -499,7 +497,6 @@ impl SpeedSpline {
     }
 }
 
-/// Splines over speed with equal knots.
 #[derive(Debug, Clone)]
 pub(crate) struct Splines {
     pub shape: SpeedSpline,
@@ -538,7 +535,6 @@ impl Splines {
     }
 }
 
-/// Weights of the knot values at a speed.
 pub(crate) struct Rows {
     pub shape: DVector<f64>,
     pub work: DVector<f64>,
@@ -569,7 +565,6 @@ pub(crate) enum End {
     Fast,
 }
 
-/// Widenings of both ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct EndWidenings {
     pub slow: Widening,

@@ -6,11 +6,9 @@ use crate::table::quantity::{efficiency_in_comment, reference_in_comment};
 use crate::table::rows_to_lines::{Row, check_point_count, map_of_rows};
 use mapper_core::{CompressorMap, ImportError, ImportRemark, ImportedMap, MapDescription};
 
-/// Values of the quantities, speed by speed.
 #[derive(Debug, Default)]
 struct BetaTables {
     speeds: Vec<f64>,
-    /// Auxiliary coordinate of the columns.
     beta: Vec<f64>,
     flow: Vec<f64>,
     pressure_ratio: Vec<f64>,
@@ -268,7 +266,6 @@ impl BetaTables {
         })
     }
 
-    /// The points of the tables, as written.
     fn rows(&self) -> Result<Vec<Row>, ImportError> {
         let missing = [
             (&self.speeds, "speed"),

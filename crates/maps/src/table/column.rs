@@ -24,7 +24,6 @@ pub(crate) struct Column {
     scale: Scale,
 }
 
-/// Conversion of a value to SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Scale {
     Unit(&'static Unit),
@@ -125,7 +124,6 @@ pub(crate) enum Machine {
     Turbine,
 }
 
-/// The column of a heading; `None` if it is none of the quantities.
 pub(crate) fn column(index: usize, heading: &str, machine: Machine) -> Result<Option<Column>, ColumnError> {
     let (name, unit) = parts(heading);
     let plain: String =

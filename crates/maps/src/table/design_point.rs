@@ -10,7 +10,6 @@ pub struct MapDesign {
     pub speed: f64,
     /// Flow, pressure ratio and efficiency there; `None` if the tables do not have the point.
     pub values: Option<[f64; 3]>,
-    /// Auxiliary coordinate.
     pub rline: f64,
 }
 
@@ -96,7 +95,6 @@ fn flow_unit_in(code: &str) -> Option<f64> {
     ["WcMap", "WcArray", "Wc"].iter().find_map(|name| occurrences(code, name).find_map(unit))
 }
 
-/// The design point of the tables, without the values there.
 pub(crate) fn design_of(code: &str) -> MapDesign {
     let default = MapDesign::default();
     MapDesign {
@@ -108,7 +106,6 @@ pub(crate) fn design_of(code: &str) -> MapDesign {
     }
 }
 
-/// The unit of flow, kg/s: as described, or as the file gives it.
 pub(crate) fn flow_unit(code: &str, description: &MapDescription) -> Result<Option<f64>, ImportError> {
     let Some(column) = description.columns.iter().find(|column| column.quantity == "flow") else {
         return Ok(flow_unit_in(code));

@@ -37,7 +37,7 @@ pub fn read_any_text(text: &str, description: &MapDescription) -> Result<Importe
         read_modelica(text, description)
     } else if text.lines().take(GSP_HEAD).any(|line| line.trim_start().starts_with("Reynolds:")) {
         read_gsp(text, description)
-    } else if has_arrays(text) {
+    } else if text.contains("np.array(") || text.lines().any(|line| line.replace(' ', "").contains("=[")) {
         read_arrays(text, description)
     } else {
         read_text(text, description)
@@ -55,16 +55,11 @@ const NPSS_TABLE: &str = "Table TB_";
 /// Lines above the tables of GSP and GasTurb. Bound: the title, which begins with 99, and the effect of the Reynolds number.
 const GSP_HEAD: usize = 10;
 
-fn has_arrays(text: &str) -> bool {
-    text.contains("np.array(") || text.lines().any(|line| line.replace(' ', "").contains("=["))
-}
-
 /// The map of a workbook: of its first sheet with a table of numbers.
 pub fn read_workbook(bytes: &[u8], description: &MapDescription) -> Result<ImportedMap, ImportError> {
     read(&grid_of_workbook(bytes, description.sheet.as_deref())?, description)
 }
 
-/// Information from the rows outside the table.
 #[derive(Default)]
 pub(super) struct Notes {
     pub(super) reference: Option<ReferenceState>,
@@ -170,7 +165,6 @@ pub(super) fn check_units_of_flow(grid: &Grid, layout: &Layout) -> Result<(), Im
     Err(ImportError::NoUnit { line, heading: column.heading.clone(), key, example })
 }
 
-/// Why a measured point has no efficiency.
 fn no_efficiency(point: &MeasuredPoint) -> Warning {
     Warning::NoCompression(point.t2_k.map_or(NoCompression::NoT2, |t2_k| NoCompression::NoRise {
         rise_k: t2_k - point.t1_k,
@@ -203,7 +197,6 @@ fn check_is_compressor(measured: &[MeasuredPoint]) -> Result<(), ImportError> {
 /// Maximum speed at standstill as a ratio of the fastest. Bound: the slowest lines of maps have a tenth of it.
 const STANDSTILL_RATIO: f64 = 0.01;
 
-/// Leaves out the points at standstill, which check the zero of a stand, with a remark.
 pub(super) fn leave_out_standstill(
     points: &mut Vec<Point<'_>>,
     speed: impl Fn(&Point<'_>) -> Option<f64>,
@@ -330,7 +323,6 @@ fn measured_point(
     })
 }
 
-/// An absolute pressure, Pa.
 pub(super) fn pressure_pa(
     point: &Point<'_>,
     quantity: Quantity,
@@ -364,7 +356,6 @@ fn correct(row: &mut Row, point: &MeasuredPoint, reference: ReferenceState) {
     row.eta = row.eta.or(t2_k.map(|t2_k| apparent_efficiency(row.pressure_ratio, point.t1_k, t2_k, air)));
 }
 
-/// Reads the rows outside the table.
 pub(super) fn read_notes(grid: &Grid, first_row: usize) -> Notes {
     let mut notes = Notes::default();
     for (index, row) in grid.rows.iter().enumerate() {

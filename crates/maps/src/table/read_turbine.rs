@@ -97,7 +97,6 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, Im
     })
 }
 
-/// The speed of a point in the unit of its column, or of its block.
 fn speed_of(point: &Point<'_>) -> Option<f64> {
     let found =
         [Quantity::Speed, Quantity::ReducedSpeed].into_iter().find_map(|quantity| point.cell(quantity));

@@ -86,7 +86,6 @@ fn vane(point: &TurbineMapPoint) -> f64 {
     point.vane_position.unwrap_or(0.0)
 }
 
-/// The logarithm of a nozzle's flow function.
 fn nozzle(expansion_ratio: f64) -> f64 {
     0.5 * (1.0 - expansion_ratio.powf(SWALLOWING_EXPONENT)).ln()
 }

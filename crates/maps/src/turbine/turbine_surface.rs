@@ -14,7 +14,6 @@ pub(crate) type Place = [f64; 3];
 /// Exponents of the three coordinates.
 pub(crate) type Term = [i32; 3];
 
-/// A value to fit, and the line to which it belongs.
 #[derive(Debug, Clone)]
 pub(crate) struct Observation {
     pub place: Place,
@@ -24,14 +23,12 @@ pub(crate) struct Observation {
     pub changes: Vec<f64>,
 }
 
-/// A fitted polynomial.
 #[derive(Debug, Clone)]
 pub(crate) struct Surface {
     terms: Vec<Term>,
     coefficients: DVector<f64>,
     /// Those of the change by each error that all values share.
     common: Vec<DVector<f64>>,
-    /// Inverse of the normal matrix.
     inverse: DMatrix<f64>,
     centre: Place,
     half_range: Place,
@@ -108,7 +105,6 @@ impl Surface {
         surface.left_out_rms.is_finite().then_some(surface)
     }
 
-    /// Solves for the coefficients; `None` if the observations do not determine them.
     fn solve(&mut self, observations: &[Observation]) -> Option<()> {
         if observations.len() < self.terms.len() {
             return None;

@@ -261,7 +261,6 @@ fn ambient_pressure() -> Value {
     })
 }
 
-/// Settings of a log: the keys that its formats know.
 fn log() -> Value {
     let key = |key: &Key<LogOptions>| (key.name.to_owned(), quantity(key.description, key.example));
     let keys: Map<String, Value> = OPTION_KEYS.iter().map(key).collect();
@@ -319,7 +318,6 @@ fn noise_colour() -> Value {
     )
 }
 
-/// A mapping with these keys and no others.
 fn closed(required: &[&str], properties: Value) -> Value {
     json!({"type": "object", "required": required, "properties": properties, "additionalProperties": false})
 }
@@ -369,7 +367,6 @@ pub(crate) fn source_of(map: &ChannelMap, reads: MappedQuantity) -> Option<&Chan
     }
 }
 
-/// A mapped topic of a recording.
 #[derive(Debug)]
 pub(crate) struct MappedTopic {
     pub(crate) topic: String,
@@ -379,7 +376,6 @@ pub(crate) struct MappedTopic {
     pub(crate) outputs: Vec<(usize, MappedQuantity, &'static Unit)>,
 }
 
-/// The mapped channels of a topic; `None` if the map has none on it.
 pub(crate) fn map_topic(
     path: &Path,
     map: &ChannelMap,

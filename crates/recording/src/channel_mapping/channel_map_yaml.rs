@@ -331,7 +331,6 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Collects mistakes, so that all are reported at once.
 #[derive(Debug, Default)]
 pub(crate) struct MapMistakes {
     list: Vec<(FindingKind, Vec<Step>, String, String)>,

@@ -47,7 +47,6 @@ impl LogFinding {
     }
 }
 
-/// Names in quotes of code.
 fn quoted(names: &[String], separator: &str) -> String {
     names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(separator)
 }

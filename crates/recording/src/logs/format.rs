@@ -90,11 +90,6 @@ impl LogFormats {
     /// Size of the start of a file by which formats recognise it, bytes. Bound: effort; every format shows itself earlier.
     pub const HEAD_BYTES: usize = 4096;
 
-    /// The format of a file that starts with these bytes.
-    pub fn recognise(self, head: &[u8]) -> Option<&'static LogFormat> {
-        self.0.iter().find(|format| (format.recognises)(head))
-    }
-
     /// Opens a log.
     pub fn open(
         self,
@@ -104,7 +99,8 @@ impl LogFormats {
         let unpacked = file.unpack()?;
         let file = unpacked.as_ref().unwrap_or(file);
         let head = file.head(Self::HEAD_BYTES)?;
-        let format = self.recognise(&head).ok_or_else(|| LogError::Unknown {
+        let found = self.0.iter().find(|format| (format.recognises)(&head));
+        let format = found.ok_or_else(|| LogError::Unknown {
             path: file.path().to_owned(),
             found: describe_unknown(&head),
             known: self.names(),

@@ -121,7 +121,6 @@ impl GroupSurvey {
         self.trace.push(t_s);
     }
 
-    /// Records an interval that ends at `t_s`.
     fn add_interval(&mut self, step_s: f64, t_s: f64) {
         if self.intervals.len() < MAX_INTERVALS {
             self.intervals.push(step_s);

@@ -176,7 +176,6 @@ impl LineFit {
     }
 }
 
-/// Evidence of one channel about a gap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum GapEvidence {
     /// The reading changed: time passed.

@@ -48,7 +48,6 @@ pub(crate) struct LogClock {
     pending: Option<(f64, Vec<f64>)>,
     last_s: Option<f64>,
     intervals_s: Vec<f64>,
-    /// Number of skipped rows.
     pub(crate) strays: u64,
     /// The first skipped time, s.
     pub(crate) stray_s: f64,
@@ -58,7 +57,6 @@ pub(crate) struct LogClock {
 pub(crate) type TakeRow<'a> = dyn FnMut(f64, &[f64]) + 'a;
 
 impl LogClock {
-    /// Takes the next row.
     pub(crate) fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) -> Result<(), Restart> {
         self.rows += 1;
         if !t_s.is_finite() || t_s.abs() >= MAX_TIME_S {
@@ -93,7 +91,6 @@ impl LogClock {
         Ok(())
     }
 
-    /// Forwards the last row.
     pub(crate) fn finish(&mut self, take: &mut TakeRow<'_>) {
         let Some((pending_s, pending_values)) = self.pending.take() else { return };
         match self.last_s {
@@ -155,7 +152,6 @@ pub(crate) struct BlockAverager {
 #[derive(Debug, Default)]
 enum State {
     #[default]
-    /// The rate is not known yet.
     Undecided,
     Unchanged(RecentIntervals),
     /// At any rate.
@@ -163,7 +159,6 @@ enum State {
     Averaging(Block),
 }
 
-/// The latest intervals of a slow group.
 #[derive(Debug)]
 struct RecentIntervals {
     last_s: f64,
@@ -178,7 +173,6 @@ impl Default for RecentIntervals {
 }
 
 impl RecentIntervals {
-    /// Whether most of the intervals have become short.
     fn becomes_fast(&mut self, t_s: f64) -> bool {
         let step_s = t_s - self.last_s;
         if step_s > 0.0 || self.last_s.is_nan() {
@@ -228,7 +222,6 @@ impl BlockAverager {
         }
     }
 
-    /// Returns the remaining rows.
     pub(crate) fn finish(&mut self, take: &mut TakeRow<'_>) {
         if matches!(self.state, State::Undecided) {
             self.decide(take);

@@ -16,7 +16,6 @@ use mapper_yaml::units::Unit;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// The role of a topic for this reader.
 enum Topic {
     /// Readings, with the index of each output's series, averaged if they are fast.
     Mapped(MappedTopic, Vec<usize>, BlockAverager),
@@ -43,7 +42,6 @@ pub(crate) enum SinkMessage {
     /// Unusual provenance, with the size of the message in bytes.
     Origins(OriginMessage, usize),
     Event(Event, usize),
-    /// Unreadable.
     Damaged,
 }
 
@@ -77,7 +75,6 @@ pub(crate) struct RigSink<'a> {
     pub(crate) failure: Option<RecordError>,
     damaged: BTreeMap<String, u64>,
     value_count: u64,
-    /// Number of messages so far.
     position: u64,
     /// Time of the first readings, from which those of blocks count.
     first_time_ns: Option<u64>,
@@ -116,12 +113,10 @@ impl<'a> RigSink<'a> {
             .map(|(topic, count)| ReadWarning::DamagedMessages { topic: topic.clone(), count: *count })
     }
 
-    /// Whether readings were averaged.
     pub(crate) fn is_averaged(&self) -> bool {
         self.topics.values().any(|topic| matches!(topic, Topic::Mapped(.., blocks) if blocks.is_averaging()))
     }
 
-    /// The non-empty series.
     pub(crate) fn take_builders(&mut self) -> BTreeMap<MappedQuantity, SeriesBuilder> {
         let (position, zero_ns) = (self.position, self.first_time_ns.unwrap_or(0));
         for topic in self.topics.values_mut() {

@@ -17,7 +17,6 @@ const RECENT_SAMPLES: usize = 6;
 /// A place in the file at which the times of a channel go back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ClockBreak {
-    /// Number of the message in the file.
     pub(crate) position: u64,
     index: usize,
     /// By how much, ns.
@@ -63,7 +62,6 @@ impl SeriesBuilder {
         self.push(time_ns, value);
     }
 
-    /// Places at which the times go back.
     pub(crate) fn breaks(&self) -> &[ClockBreak] {
         &self.breaks
     }
@@ -145,7 +143,6 @@ impl SeriesBuilder {
         self.times_ns.is_sorted()
     }
 
-    /// Times between neighbours, s, where they advance.
     pub(crate) fn intervals_s(&self) -> Vec<f64> {
         let steps = self.times_ns.windows(2).filter_map(|pair| pair[1].checked_sub(pair[0]));
         steps.filter(|step| *step > 0).map(|step| step as f64 / NS_PER_S).collect()

@@ -11,7 +11,6 @@ use mapper_numerics::statistics::{mean, rms};
 /// 0 degC, K.
 const ZERO_C_K: f64 = 273.15;
 
-/// The next experiment and its alternatives; empty if nothing remains to be decided.
 pub(crate) fn next_section(diagnosis: &Diagnosis) -> Document {
     let mut document = Document::default();
     let Some(next) = &diagnosis.next else { return document };
@@ -167,7 +166,6 @@ const CLASSES: [(f64, Colour, &str); 4] = [
     (f64::INFINITY, palette::VERMILLION, "beyond 10 sigma"),
 ];
 
-/// Ends of the steps on the compressor map, coloured by their residual, before and after.
 pub(crate) fn residual_maps(study: &Study, evidence: &Evidence) -> Vec<Figure> {
     let mut pictures = Vec::new();
     let after = evidence.with_cause.as_ref().map(|(cause, _, residual)| (format!("with {cause}"), residual));

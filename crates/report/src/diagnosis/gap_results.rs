@@ -83,7 +83,6 @@ pub fn correction(map: &CorrectedMap, diagnosis: &Diagnosis) -> Document {
     document
 }
 
-/// What happens to those who use the map as recorded.
 fn consequence(points: &[PointCorrection]) -> Option<String> {
     let both = points.iter().filter_map(|point| Some((point, point.before?, point.after?)));
     let changes: Vec<(usize, f64, bool)> = both

@@ -86,7 +86,6 @@ fn recommendations(diagnosis: &Diagnosis) -> Document {
     document
 }
 
-/// The most probable causes with their probabilities, and the tolerances outside their prior.
 fn causes(diagnosis: &Diagnosis) -> Document {
     let candidate_rows = diagnosis.listed().take(CAUSES).map(|candidate| {
         let others =
@@ -157,7 +156,6 @@ fn detection_limits(effects: &[SmallestSeen]) -> Document {
     document
 }
 
-/// The difference between measured and computed readings, as figures and tables.
 fn evidence(diagnosed: &Diagnosed, figures: &Evidence) -> Document {
     let Diagnosed { diagnosis, study, .. } = diagnosed;
     let mut document = Document::default();
@@ -356,7 +354,6 @@ fn add_unjudged(document: &mut Document, baseline: &Baseline) {
 /// Width of lines of a campaign.
 const WIDTH: usize = 78;
 
-/// A mapping of a campaign on few lines, broken between its entries.
 fn flow_mapping(start: &str, entries: &[String], end: &str) -> String {
     let mut lines = vec![start.to_owned()];
     for (index, entry) in entries.iter().enumerate() {
@@ -390,7 +387,6 @@ fn nearest(diagnosis: &Diagnosis) -> Option<String> {
     }
 }
 
-/// Effects by their names, with ids and onset times.
 fn candidate_name(candidate: &Candidate) -> String {
     let describe = |(id, name): (&String, &String)| match candidate.onsets.get(id) {
         Some(onset) if onset.grows => format!("{name} ({id}) growing from step {}", step_number(onset.step)),

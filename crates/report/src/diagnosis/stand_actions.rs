@@ -110,7 +110,6 @@ pub(crate) fn stand_actions(diagnosis: &Diagnosis) -> Vec<String> {
     once
 }
 
-/// The measurement that decides between the causes that are left, in a sentence.
 pub(crate) fn next_measurement(diagnosis: &Diagnosis) -> Option<String> {
     let first = diagnosis.experiments.first();
     Some(match diagnosis.next.as_ref()? {

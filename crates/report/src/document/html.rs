@@ -5,7 +5,6 @@ use mapper_core::{step_number, terminal_text};
 use maud::{Markup, PreEscaped, html};
 
 impl Document {
-    /// The document as HTML, its sections with headings of level 2.
     pub(crate) fn html(&self) -> Markup {
         self.html_at(2)
     }

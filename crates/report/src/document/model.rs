@@ -37,7 +37,6 @@ pub(super) enum Tone {
     Verdict(Verdict),
 }
 
-/// Names and values, one pair a row.
 #[derive(Debug, Clone)]
 pub(super) struct Facts {
     pub(super) caption: String,
@@ -79,7 +78,6 @@ pub(super) struct Row {
 #[derive(Debug, Clone)]
 pub struct Cell {
     pub(super) text: String,
-    /// The value behind the text, for sorting.
     pub(super) value: Option<f64>,
     pub(super) look: Look,
 }
@@ -107,12 +105,10 @@ impl From<&str> for Cell {
 }
 
 impl Cell {
-    /// A number as displayed, sorted by its value.
     pub(crate) fn number(text: impl Into<String>, value: f64) -> Self {
         Cell { value: Some(value).filter(|value| value.is_finite()), ..text.into().into() }
     }
 
-    /// A number; a dash without a finite value.
     pub(crate) fn optional(value: Option<f64>, text: impl FnOnce(f64) -> String) -> Self {
         match value.filter(|value| value.is_finite()) {
             Some(value) => Cell::number(text(value), value),

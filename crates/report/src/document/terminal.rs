@@ -26,7 +26,6 @@ pub enum Paint {
 }
 
 impl Paint {
-    /// Words in the colour of a verdict: green, yellow, red.
     fn verdict(self, verdict: Verdict, text: &str) -> String {
         let code = match verdict {
             Verdict::Good => 32,
@@ -100,7 +99,6 @@ fn write(text: &mut String, document: &Document, paint: Paint) {
     }
 }
 
-/// Whether a blank line stands before and after the block.
 fn is_separated(block: &Block) -> bool {
     matches!(block, Block::Table(_) | Block::Facts(_) | Block::Section(_))
 }
@@ -142,7 +140,6 @@ fn laid_out(table: &Table) -> String {
     text.or_else(broken).unwrap_or_else(|| split_into_parts(table).join("\n\n")) + "\n"
 }
 
-/// These columns side by side, each as wide as its content.
 fn columns(table: &Table, shown: &[usize], head_columns: usize) -> Layout {
     let mut layout = Layout::new();
     let head = |column: &usize| wrapped(&table.heads[*column], head_columns, 0).trim_end().to_owned();
@@ -184,7 +181,6 @@ fn with_a_broken_text(table: &Table, shown: &[usize]) -> Layout {
     layout
 }
 
-/// As many columns as fit, below each other.
 fn split_into_parts(table: &Table) -> Vec<String> {
     let part = |shown: &[usize]| {
         let text = lines(&columns(table, shown, NARROW));

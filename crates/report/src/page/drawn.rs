@@ -134,7 +134,6 @@ pub(crate) struct DrawnPoint {
     #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
     step: usize,
     name: String,
-    /// Corrected speed of its line, as text.
     line: String,
     speed: f64,
     flow: f64,
@@ -159,7 +158,6 @@ pub(crate) struct DrawnPoint {
     raw: Vec<String>,
 }
 
-/// All points, repeats included.
 pub(crate) fn drawn_points(report: &RunReport<'_>, display: &Display) -> Vec<DrawnPoint> {
     let line_of = |step: usize| {
         let lines = report.results.map.into_iter().flat_map(|map| &map.lines);

@@ -90,7 +90,6 @@ pub(crate) fn shell(
     Ok(page.into_string())
 }
 
-/// The footer of each printed sheet, with the sheet's number and the total.
 fn footer_style(footer: &str) -> String {
     // Escaped as numbers, so that no letter of a name can end a string or an element.
     let text: String = footer
@@ -103,7 +102,6 @@ fn footer_style(footer: &str) -> String {
     )
 }
 
-/// JSON in which no string can end the element.
 fn json_in_html(data: &impl Serialize) -> Result<String, serde_json::Error> {
     Ok(serde_json::to_string(data)?
         .replace('<', "\\u003c")

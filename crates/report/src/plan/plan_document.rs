@@ -66,7 +66,6 @@ fn mark(kind: StepKind) -> &'static str {
     }
 }
 
-/// The meaning of the marks of these steps; empty without any.
 fn marks_legend(kinds: &[StepKind]) -> String {
     let marks = [
         (StepKind::Repeat, "r visits a point again, to show drift or to lead around a forbidden jump"),
@@ -467,7 +466,6 @@ fn panel(
     panel
 }
 
-/// The numbers of the steps at each point, combined if there are several.
 fn numbers(plan: &Plan, places: &[(f64, f64)]) -> Vec<(String, (f64, f64))> {
     let count = plan.steps.len();
     let mut labels: Vec<(OperatingPoint, String, (f64, f64))> = Vec::new();

@@ -61,7 +61,6 @@ pub fn budget_csv(budgets: &[PointBudgets]) -> std::io::Result<Vec<u8>> {
     writer.into_inner().map_err(csv::IntoInnerError::into_error)
 }
 
-/// Contributions to the efficiency of every point, and to its pressure ratio; empty without budgets.
 pub(crate) fn budget_section(budgets: &[PointBudgets]) -> Document {
     let etas: Vec<(usize, &UncertaintyBudget)> =
         budgets.iter().filter_map(|point| Some((point.step, point.eta.as_ref()?))).collect();
@@ -119,7 +118,6 @@ pub fn wheel_coefficients(point: &IdentifiedPoint, wheel_diameter_m: f64, air: A
     WheelCoefficients::new(&measured, wheel_diameter_m, air)
 }
 
-/// The table; `None` if the campaign declares no wheel.
 pub(crate) fn wheel_section(
     campaign: &Campaign,
     points: &[ScoredPoint],

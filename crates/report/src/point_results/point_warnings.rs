@@ -8,10 +8,8 @@ use mapper_core::{
     Dimension, IdentifiedPoint, Method, ResultRemark, Verdict, half_width_95, probability_text, step_number,
 };
 
-/// A sentence, and the steps that it applies to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Doubt<'a> {
-    /// Steps, from 1, in order.
     steps: Vec<usize>,
     pub code: &'a str,
     sentence: Sentence,
@@ -37,7 +35,6 @@ pub fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<Doub
     merged
 }
 
-/// For each reason why points are not good, the steps and a sentence.
 pub(crate) fn reasons<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<String> {
     let all: Vec<&IdentifiedPoint> = points.collect();
     let first_only: Vec<IdentifiedPoint> = all
@@ -57,12 +54,10 @@ pub(crate) fn reasons<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> 
 }
 
 impl Doubt<'_> {
-    /// The sentence; a value that differs between steps is shown as a range.
     pub fn message(&self) -> String {
         self.sentence.to_string()
     }
 
-    /// Number of steps that it applies to.
     pub fn count(&self) -> usize {
         self.steps.len()
     }

@@ -30,7 +30,6 @@ pub(crate) enum Column {
     T2Change,
     T1,
     P1,
-    /// Readings at the end of the step.
     Read(Channel),
     Verdict,
     TrueEta,
@@ -186,7 +185,6 @@ fn points_of_line(points: &[ScoredPoint], is_on_it: impl Fn(usize) -> bool) -> V
     own_points
 }
 
-/// All points in one wide table; with their true values if `truth` is set and they are known.
 pub(crate) fn wide_table(points: &[ScoredPoint], display: &Display, truth: bool) -> Table {
     let true_columns: &[Column] = if with_truth(points, truth) { &[C::TrueEta, C::TrueH] } else { &[] };
     points_table(&[&WIDE, true_columns].concat(), points.iter(), None, display)
@@ -333,7 +331,6 @@ pub fn at_end(recording: &Recording, marker: &StepMarker, channel: Channel) -> O
     mean(values).filter(|mean| mean.is_finite())
 }
 
-/// One sentence on the points whose 95 % intervals by both methods do not overlap; `None` if all overlap.
 pub fn disagreement_text(
     points: &[ScoredPoint],
     dynamic: &[DynamicEfficiency],

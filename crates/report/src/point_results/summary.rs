@@ -91,7 +91,6 @@ impl<'a> PointResults<'a> {
         document
     }
 
-    /// What concerns several points: repeats, common parameters, sensors, zero and surge.
     pub(crate) fn common_parts(&self, display: &Display, truth: bool) -> Document {
         let mut document = Document::default();
         document.section("Drift", repeats_section(self.repeats, display));

@@ -20,7 +20,6 @@ impl Message for ModelDoubt {
     }
 }
 
-/// The sentence of a warning, whose numbers become ranges over several points.
 pub(crate) fn sentence_of(warning: &Warning) -> Sentence {
     let sentence =
         reading_sentence(warning).or_else(|| step_sentence(warning)).or_else(|| fit_sentence(warning));
@@ -30,7 +29,6 @@ pub(crate) fn sentence_of(warning: &Warning) -> Sentence {
     })
 }
 
-/// The sentence of a warning about intervals or the fit of all steps; `None` for others.
 fn fit_sentence(warning: &Warning) -> Option<Sentence> {
     Some(match warning {
         Warning::SmallGradient { dt2_k, needed_dt2_k, eta_sigma } => sentence!(
@@ -157,7 +155,6 @@ fn model_doubt(doubt: &ModelDoubt) -> Sentence {
     }
 }
 
-/// The sentence of a warning about the readings themselves; `None` for others.
 fn reading_sentence(warning: &Warning) -> Option<Sentence> {
     Some(match warning {
         Warning::DeadChannel { channel, reading } => {
@@ -334,7 +331,6 @@ fn contradiction(faults: &[SuspectedFault]) -> Sentence {
     })
 }
 
-/// What to do about a sensor that reads another value at rest than its neighbours.
 fn offset_remedy(fault: &SuspectedFault, is_soak: bool) -> Sentence {
     let ([channel], "K" | "Pa") = (fault.channels.as_slice(), fault.unit.as_str()) else {
         return sentence!("repair the sensors, or declare their uncertainty");
@@ -390,7 +386,6 @@ fn steps_contradict(conflict: &StepConflict) -> Sentence {
 const POOR_FIT_REMEDY: &str = ": declare the noise and the probe that T2 really has; `joint` finds probe and alpha_A, `mapper gap` looks \
      for other causes";
 
-/// The sentence of a warning about a step: its window, its transient, its own fit; `None` for others.
 fn step_sentence(warning: &Warning) -> Option<Sentence> {
     Some(match warning {
         Warning::NoTransient => {

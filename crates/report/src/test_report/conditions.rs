@@ -123,7 +123,6 @@ pub(crate) fn instruments_section(
     document
 }
 
-/// A row for each sensor of the campaign. `used`: the uncertainties of the identification.
 fn instrument_rows(
     campaign: &Campaign,
     used: &BTreeMap<Channel, DeclaredUncertainty>,
@@ -164,7 +163,6 @@ fn instrument_rows(
     campaign.sensors.iter().map(row).collect()
 }
 
-/// Common reading of the zero for a sensor that was zeroed.
 fn rest_reading(zero: Option<&IsothermalZero>, channel: Channel) -> Option<f64> {
     let zero = zero?;
     zero.offsets.get(&channel)?;
@@ -248,11 +246,8 @@ const BALANCE_WORDS: &str = "Means of the last 2 s of each step, half widths of 
                                  others; until the housings are settled, heat that they store is part of them, and so are oil and water where they \
                                  are not measured.";
 
-/// The points and their readings.
 pub struct JudgedPoints<'a> {
-    /// Its criteria; `None` for a log without a campaign.
     pub campaign: Option<&'a Campaign>,
-    /// The readings.
     pub recording: &'a Recording,
     pub gases: Gases,
     pub points: &'a [ScoredPoint],
@@ -271,7 +266,6 @@ fn balances<'a>(report: &JudgedPoints<'a>) -> Vec<(&'a StepMarker, EnergyBalance
     steps.map(balance).collect()
 }
 
-/// A row for each point; none if the power of the turbine was not measured.
 fn balance_rows(report: &JudgedPoints<'_>) -> Vec<[String; 6]> {
     let balances = balances(report);
     if balances.iter().all(|(_, balance)| balance.turbine.is_none()) {
@@ -289,7 +283,6 @@ fn balance_rows(report: &JudgedPoints<'_>) -> Vec<[String; 6]> {
     balances.into_iter().map(row).collect()
 }
 
-/// A row for each criterion of the campaign; none without criteria.
 fn acceptance_rows(report: &JudgedPoints<'_>) -> Vec<[String; 5]> {
     let criteria = report.campaign.and_then(|campaign| campaign.acceptance.as_ref());
     let Some(criteria) = criteria else { return Vec::new() };
@@ -315,7 +308,6 @@ fn acceptance_rows(report: &JudgedPoints<'_>) -> Vec<[String; 5]> {
     judge_acceptance(criteria, report.recording, &balances(report)).into_iter().map(row).collect()
 }
 
-/// Name, source and window of the campaign's criteria, a sentence.
 fn acceptance_words(report: &JudgedPoints<'_>) -> Option<String> {
     let criteria = report.campaign?.acceptance.as_ref()?;
     Some(format!(
@@ -332,7 +324,6 @@ pub(crate) fn acceptance_section(report: &JudgedPoints<'_>) -> Document {
     document
 }
 
-/// The energy balance of each point; empty if the power of the turbine was not measured.
 pub(crate) fn balance_section(report: &JudgedPoints<'_>) -> Document {
     let mut document = Document::default();
     let rows = balance_rows(report);

@@ -125,7 +125,6 @@ impl Message for RunEnding {
     }
 }
 
-/// The assumed sizes in one sentence, by name; `None` if the campaign gives all of them.
 pub(crate) fn assumed_sentence(campaign: &Campaign) -> Option<String> {
     sentence_with(campaign, |size| size.name)
 }

@@ -110,7 +110,6 @@ impl RunReport<'_> {
         format!("Compressor map of {}", self.machine)
     }
 
-    /// Customer, machine, place, date and persons; the definition of the numbers.
     pub(crate) fn cover(&self) -> Document {
         let mut document = Document::default();
         document.facts("", cover_facts(self));
@@ -144,7 +143,6 @@ impl RunReport<'_> {
         verdict_sentence(self.results.identified())
     }
 
-    /// What the results depend on, the key figures, the recommended actions and the remarks.
     pub(crate) fn summary(&self) -> Document {
         let mut document = Document::default();
         document.text(self.origin.sentence());

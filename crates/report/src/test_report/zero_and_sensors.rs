@@ -9,7 +9,6 @@ use mapper_observe::FusedChannel;
 use mapper_recording::score::ScoredMark;
 use serde::Serialize;
 
-/// A sentence with the result or the reason for its absence; `None` if no zero was requested.
 pub(crate) fn zero_sentence(zero: &ZeroOutcome) -> Option<String> {
     match zero {
         ZeroOutcome::NotRequested => None,
@@ -24,7 +23,6 @@ pub(crate) fn zero_sentence(zero: &ZeroOutcome) -> Option<String> {
     }
 }
 
-/// The sentence, and a row for each sensor with an offset; empty if no zero was requested.
 pub(crate) fn zero_section(zero: &ZeroOutcome, display: &Display) -> Document {
     let mut document = Document::default();
     document.text(zero_sentence(zero).unwrap_or_default());
@@ -119,7 +117,6 @@ pub(crate) fn surge_section(surge: &SurgeReport, display: &Display, truth: bool)
     document
 }
 
-/// The number of surge events, and the lines without a mark, a sentence each.
 fn surge_remarks(surge: &SurgeReport) -> Vec<String> {
     std::iter::once(times(surge.surges))
         .chain(surge.remarks.iter().map(|SurgeNotFound { target_speed_rpm, openings, enough }| match enough {
@@ -133,7 +130,6 @@ fn surge_remarks(surge: &SurgeReport) -> Vec<String> {
         .collect()
 }
 
-/// A row for each mark, in order of speed.
 fn surge_rows(marks: &[ScoredMark], display: &Display, truth: bool) -> Vec<Vec<String>> {
     let row = |ScoredMark { mark, truth_flow_corrected_kg_s }: &ScoredMark| {
         let flow_kg_s = mark.flow_corrected_kg_s;

@@ -157,7 +157,6 @@ impl SealedForecast {
     }
 }
 
-/// Refuses a file of a later program.
 pub(crate) fn check_format(path: &Path, found: u32, known: u32) -> Result<(), SessionError> {
     let why =
         || format!("its format_version is {found}, and this program knows {known}: use a newer program");

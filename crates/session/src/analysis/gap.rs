@@ -234,11 +234,8 @@ fn of_rig(
     }
 }
 
-/// A recording with its diagnosis and the map without the causes.
 pub struct GapCorrection {
-    /// The diagnosis.
     pub gap: Gap,
-    /// Before and after, point by point.
     pub map: CorrectedMap,
     /// Identification of the corrected readings with the uncertainty of the correction; if nothing was corrected, widened by the open causes.
     pub identified: Identified,
@@ -391,7 +388,6 @@ fn corners(points: &[OperatingPoint]) -> Vec<OperatingPoint> {
     corners
 }
 
-/// Accepted steps of T3 and oil temperature within the limits, at constant speed and valve opening.
 fn temperature_steps(
     campaign: &Campaign,
     model: &Model,

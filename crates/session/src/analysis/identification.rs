@@ -346,7 +346,6 @@ impl Session<'_> {
     }
 }
 
-/// Remarks on instruments of the cell that contradict all sensors of a kind at rest.
 fn contradictions(zero: &IsothermalZero) -> impl Iterator<Item = ResultRemark> + '_ {
     let contradicting = zero.references.iter().filter(|reference| reference.contradiction().is_some());
     contradicting.filter_map(|reference| {
@@ -359,7 +358,6 @@ fn contradictions(zero: &IsothermalZero) -> impl Iterator<Item = ResultRemark> +
     })
 }
 
-/// Remark that gauge pressures are added to an unknown ambient pressure.
 fn unknown_barometer(map: &ChannelMap) -> Option<ResultRemark> {
     let unknown = Barometer::unknown();
     let used = [Channel::P1, Channel::P2].into_iter().any(|channel| map.is_gauge(channel));
@@ -368,7 +366,6 @@ fn unknown_barometer(map: &ChannelMap) -> Option<ResultRemark> {
     )
 }
 
-/// Remark that a recording has a soak long enough for a zero, but no zero was requested.
 fn unused_rest(recording: &Recording, config: &IdentifyConfig) -> Option<ResultRemark> {
     let settings = ZeroSettings { shortest_s: UNUSED_REST_S, ..ZeroSettings::default() };
     let rest = isothermal_zero(recording, config, &settings).ok().filter(|rest| !rest.offsets.is_empty())?;
@@ -381,7 +378,6 @@ struct Source {
     may_have_truth: bool,
 }
 
-/// The campaign that all recordings belong to; `None` if none names one.
 fn same_campaign(recorded: &[Recorded]) -> Result<Option<&Campaign>, SessionError> {
     let first = recorded.first().ok_or(SessionError::NoRecording)?;
     let Some(campaign) = &first.campaign else { return Ok(None) };

@@ -21,7 +21,6 @@ const MAX_DURATION: Duration = Duration::from_secs(60);
 /// Interval of the checks whether it has ended.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Why a page could not be printed.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum PrintError {

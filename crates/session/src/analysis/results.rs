@@ -56,10 +56,8 @@ pub struct Results {
 pub(crate) struct Provenance {
     campaign: Option<Campaign>,
     plan: Option<Plan>,
-    /// How the run ended; `None` for points from recordings.
     ending: Option<RunEnding>,
     machine: String,
-    /// Test date for people.
     tested_at: Option<String>,
     sources: Vec<ReportSource>,
 }
@@ -93,7 +91,6 @@ impl Provenance {
         }
     }
 
-    /// Units of the map's pictures, as requested by the campaign.
     fn map_units(&self) -> MapUnits {
         let Some(campaign) = &self.campaign else { return MapUnits::default() };
         let display = Display::new(&campaign.display);
@@ -174,7 +171,6 @@ impl Session<'_> {
         self.write_identification(recorded, directory, |recorded| self.identify(recorded, map, method))
     }
 
-    /// The same for recordings that are identified in another way.
     pub(crate) fn write_identification(
         &self,
         recorded: Vec<Recorded>,
@@ -382,7 +378,6 @@ fn source(recorded: &Recorded) -> ReportSource {
     }
 }
 
-/// Remarks on the parts of a file that cannot be read, with its name if there are several.
 fn remarks_of(recorded: &Recorded, several: bool) -> impl Iterator<Item = ResultRemark> {
     let file = several.then(|| recorded.path.display().to_string());
     recorded.read.warnings.iter().map(move |warning| incomplete(file.clone(), warning))
@@ -437,12 +432,10 @@ fn export(
     Ok(paths)
 }
 
-/// The written files and their contents.
 #[derive(Debug, Serialize)]
 pub struct RigFiles {
     pub files: Vec<PathBuf>,
     pub turbine: Vec<ScoredTurbinePoint>,
-    /// Parameters common to all points (joint method).
     pub thermal: Option<ThermalModel>,
 }
 
@@ -484,7 +477,6 @@ impl Session<'_> {
     }
 }
 
-/// The figure as PNG, with two pixels per unit.
 pub(crate) fn png(figure: &Figure) -> Result<Vec<u8>, SessionError> {
     Ok(figure.to_png(2.0).map_err(ExportError::failed("png"))?)
 }

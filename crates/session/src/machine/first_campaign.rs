@@ -52,15 +52,11 @@ impl FirstRig {
     }
 }
 
-/// The files that were written.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FirstCampaign {
     pub campaign: PathBuf,
-    /// The nominal map.
     pub map: PathBuf,
-    /// The channel map; `None` for the virtual lab.
     pub channels: Option<PathBuf>,
-    /// Points of the grid.
     pub points: usize,
     pub assumed: Vec<AssumedSize>,
 }
@@ -334,13 +330,10 @@ fn evenly_spaced_rpm((low_rpm, high_rpm): (f64, f64)) -> Vec<f64> {
 
 #[derive(Debug)]
 pub(crate) struct FirstMap {
-    /// Name of its file in the campaign's directory.
     pub file_name: String,
-    /// The file's text.
     pub text: String,
     /// Corrected speeds of the grid in order, rpm.
     pub speeds_rpm: Vec<f64>,
-    /// Reference state of the table, and of the campaign.
     pub reference: ReferenceState,
     /// Choke flow of the machine's own map over that of a similar compressor at equal speed; `None` without an own map.
     pub flow_ratio: Option<f64>,

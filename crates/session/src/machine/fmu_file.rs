@@ -22,7 +22,6 @@ use std::sync::Arc;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WrittenFmu {
     pub file: PathBuf,
-    /// Source of its numbers, in one sentence.
     pub origin: String,
     pub start_speed_rpm: f64,
     /// Folder of the library for this computer; `None` if the FMU contains sources only.

@@ -6,7 +6,6 @@ use mapper_numerics::statistics::mean;
 use mapper_physics::laws::turbine::{TurbineInlet, isentropic_drop_j_kg};
 use mapper_physics::machine::params::{BoundaryConditions, Params, TurbineParams};
 
-/// Declared parameters, replaced by the identified values if they exist.
 pub(crate) fn with_identified(declared: &Params, found: &ThermalModel) -> Params {
     let mut params = *declared;
     let compressor = &mut params.compressor;

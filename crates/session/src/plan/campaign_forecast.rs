@@ -41,15 +41,12 @@ const QUICK_EFFORT: f64 = 0.05;
 pub struct CampaignForecast {
     /// Number of steps; the upper bound if the grid is too large to plan here.
     pub steps: usize,
-    /// Whether the number is exact.
     pub is_planned: bool,
     /// Rig time from the start of the soak to the end of the cool-down, s; the maximum if the number of steps is an upper bound.
     pub duration_s: f64,
-    /// Expected problems.
     pub concerns: Vec<Concern>,
     /// Expected verdicts of the points; `None` for a script and for methods other than `joint`.
     pub verdicts: Option<VerdictForecast>,
-    /// The slowest crossing of the speeds to avoid.
     pub avoided: Option<PlanRemark>,
     /// Changes after which more points are expected to be good, the cheapest first.
     pub advice: Vec<Advice>,
@@ -157,7 +154,6 @@ impl<'a> SoakingHousings<'a> {
         Some(SoakingHousings { campaign, soak, settings: ZeroSettings::from(soak) })
     }
 
-    /// Difference of the compressor housing from the cell, K.
     fn difference_k(&self, after_s: f64) -> f64 {
         let ambient_k = self.campaign.boundary.ambient_temperature_k;
         let start = StandstillState { tc_k: ambient_k + WARM_K, tt_k: ambient_k + WARM_K };
@@ -192,7 +188,6 @@ pub(crate) fn longer_soak_s(campaign: &Campaign) -> Option<f64> {
     housings.shortest_s().filter(|_| !housings.is_sufficient(housings.soak.duration_s))
 }
 
-/// A soak too short for the housings to reach the cell temperature.
 fn soak_concern(campaign: &Campaign) -> Option<Concern> {
     let housings = SoakingHousings::of(campaign)?;
     let duration_s = housings.soak.duration_s;
@@ -287,7 +282,6 @@ fn required_error_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     })
 }
 
-/// A window dominated by the response of the declared T2 probe to the preceding step.
 fn probe_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let params = &campaign.machine.params;
     let (diameter_m, pipe_m) = (params.t2_probe_diameter_m, params.compressor.outlet_diameter_m);

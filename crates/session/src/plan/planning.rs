@@ -48,7 +48,6 @@ pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, S
     Ok(plan)
 }
 
-/// The points of a campaign in planned order, without any further forecast.
 pub(crate) fn order_points(campaign: &Campaign, model: &Model) -> Result<Vec<OperatingPoint>, SessionError> {
     let inputs = PlanInputs::of(campaign)?;
     let request = PlanRequest { method: None, ..inputs.request(campaign, model) };
@@ -103,7 +102,6 @@ impl PlanInputs {
     }
 }
 
-/// Error forecast of the campaign's method after its zero; `None` for imported points.
 fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
     let config = identification_after_zero(campaign);
     let scope = match campaign.identification.method {
@@ -115,7 +113,6 @@ fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
     Some(Box::new(Forecaster::of(config, scope)))
 }
 
-/// Expected identification settings after the zero, as far as known before the run.
 fn identification_after_zero(campaign: &Campaign) -> IdentifyConfig {
     let config = identification(campaign);
     match campaign.zero {
@@ -133,7 +130,6 @@ const LONGER_RATIO: f64 = 2.0;
 /// Minimum relative reduction of an offset by a longer soak that is reported.
 const MIN_REDUCTION_RATIO: f64 = 0.3;
 
-/// The remark of a plan; `None` without a zero or without declared offsets.
 fn zero_remark(campaign: &Campaign) -> Option<PlanRemark> {
     let soak = campaign.zero?;
     let left_after = |soak_s: f64| -> BTreeMap<Channel, f64> {
@@ -222,7 +218,6 @@ pub fn hold_near_surge(campaign: &Campaign, model: &Model, point: OperatingPoint
     })
 }
 
-/// Adds the search, as forecast on the nominal machine, to a plan's duration and remarks.
 pub(crate) fn add_surge_search(campaign: &Campaign, model: &Model, plan: &mut Plan) {
     let Some(seek) = campaign.surge_search else { return };
     let mut ends: Vec<OperatingPoint> = Vec::new();
@@ -301,7 +296,6 @@ pub fn stored_plan(path: &Path, now: &PlanInputHashes, campaign: &Campaign) -> R
     }
 }
 
-/// The first violation in a plan, in words.
 fn find_violation(plan: &Plan, campaign: &Campaign) -> Option<String> {
     if plan.steps.is_empty() || plan.steps.len() > MAX_STEPS {
         return Some(format!("it has {} steps; a plan has 1 to {MAX_STEPS}", plan.steps.len()));
@@ -368,12 +362,10 @@ pub(crate) struct ScriptedSteps {
     rest_s: f64,
     settling: Option<SettleWatch>,
     pub(crate) finished: Option<StepResult>,
-    /// Ended steps with their actual times.
     pub done: Vec<PlanStep>,
 }
 
 impl ScriptedSteps {
-    /// The steps of a campaign's script on this rig.
     pub fn new(
         campaign: &Campaign,
         model: &Model,

@@ -115,7 +115,6 @@ impl Session<'_> {
     }
 }
 
-/// The current step of a rehearsal, and the highest speed so far.
 #[derive(Debug, Default)]
 struct Progress {
     to: Option<OperatingPoint>,
@@ -139,7 +138,6 @@ struct NoObserver;
 
 impl RunObserver for NoObserver {}
 
-/// Steps on the nominal machine; their identified points are the forecast.
 struct RehearsalSteps {
     steps: ScriptedSteps,
     notes: Vec<String>,

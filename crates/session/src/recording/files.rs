@@ -39,7 +39,6 @@ pub fn write_file(path: &Path, bytes: &[u8], existing: Existing) -> Result<(), S
         .map_err(SessionError::file("write", path))
 }
 
-/// Writes files to a directory, which is created if it is missing, and returns their paths.
 pub(crate) fn write_files(
     directory: &Path,
     contents: &[(&str, Vec<u8>)],

@@ -72,7 +72,6 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
     }
 }
 
-/// The conditions that the campaign declares as constant, SI.
 pub(crate) fn declared_conditions(campaign: &Campaign) -> BTreeMap<Channel, f64> {
     let (boundary, follows) = (&campaign.boundary, &campaign.follow_outlet);
     let mut conditions = BTreeMap::from([

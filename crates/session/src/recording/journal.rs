@@ -12,20 +12,14 @@ use std::path::Path;
 /// Maximum size of a journal, bytes: some hundred thousand steps.
 const MAX_JOURNAL_BYTES: u64 = 16 << 20;
 
-/// Properties that must be unchanged to resume a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     pub machine: String,
     pub serial_number: Option<String>,
-    /// Hash of the campaign.
     pub campaign_sha256: String,
-    /// Hash of the nominal model.
     pub model_sha256: String,
-    /// Hash of the plan.
     pub plan_sha256: String,
-    /// The backend and its rig.
     pub backend: String,
-    /// Hash of the backend's settings.
     pub settings_sha256: String,
     /// Hash of the rig description; missing in journals of older runs.
     #[serde(default)]
@@ -38,7 +32,6 @@ pub fn rig_sha256(rig: &RigDescription) -> Result<String, SessionError> {
 }
 
 impl Identity {
-    /// Identity of a run.
     pub fn of(campaign: &Campaign, plan: &Plan, rig: &RigDescription) -> Result<Self, SessionError> {
         let hash = |text: &str| mapper_planner::sha256_hex(text);
         let behind = rig.exclusive.as_deref().map(|name| format!(" ({name})")).unwrap_or_default();
@@ -60,7 +53,6 @@ impl Identity {
         })
     }
 
-    /// Names of the properties that differ.
     pub fn differences(&self, now: &Identity) -> Vec<&'static str> {
         [
             ("the machine", self.machine != now.machine || self.serial_number != now.serial_number),
@@ -83,11 +75,9 @@ pub(crate) fn both_known_and_differ(then: Option<&str>, now: Option<&str>) -> bo
     then.zip(now).is_some_and(|(then, now)| then != now)
 }
 
-/// One journal entry.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Entry {
-    /// A part of the run begins, with a new recording.
     Part {
         identity: Identity,
         recording: String,
@@ -98,7 +88,6 @@ pub enum Entry {
     Ended(RunEnding),
 }
 
-/// A journal that is being written.
 #[derive(Debug)]
 pub struct Journal {
     file: File,
@@ -128,7 +117,6 @@ impl Journal {
         Ok(Journal { file, synced })
     }
 
-    /// Writes one line.
     pub fn write(&mut self, entry: &Entry) -> std::io::Result<()> {
         let mut line = serde_json::to_vec(entry)?;
         line.push(b'\n');
@@ -137,18 +125,12 @@ impl Journal {
     }
 }
 
-/// One part of a run, as read from its journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JournalPart {
-    /// Identity of the run.
     pub identity: Identity,
-    /// File name of its recording.
     pub recording: String,
-    /// Whether its soak is recorded.
     pub soaked: bool,
-    /// Recorded steps.
     pub saved: BTreeSet<usize>,
-    /// Whether it reached the end of the run's steps.
     pub completed: bool,
     /// Whether its recording cannot be read and contained steps or a soak that no other part has.
     pub unreadable: bool,

@@ -209,19 +209,13 @@ pub(crate) fn check_machine(recorded: &Recorded, campaign: &Campaign) -> Result<
     mapper_observe::same_machine(&recorded.read.metadata, &machine.name, machine.serial_number.as_deref())
 }
 
-/// Contents of a log, and the channel map proposed for it.
 #[derive(Debug)]
 pub struct LogInspection {
-    /// The file.
     pub path: PathBuf,
     pub format: &'static str,
-    /// Groups, columns and detected layout.
     pub layout: Layout,
-    /// Rates, ranges, gaps.
     pub survey: Survey,
-    /// The proposed channel map.
     pub proposal: Proposal,
-    /// Options that were used to read it.
     pub options: Vec<(String, String)>,
 }
 
@@ -285,7 +279,6 @@ impl LogInspection {
         })
     }
 
-    /// The proposal as text of a channel map.
     pub fn channel_map(&self) -> String {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
         channel_map_text(&name, &self.layout, &self.proposal, &self.options)

@@ -13,7 +13,6 @@ use std::path::{Path, PathBuf};
 /// First index for steps that are repeated only to approach a missing step from its planned predecessor.
 pub(crate) const FIRST_REPEAT_INDEX: usize = StepMarker::FIRST_REPEAT_INDEX;
 
-/// Whether the steps of a campaign depend on measured data.
 pub(crate) fn depends_on_readings(campaign: &Campaign) -> bool {
     campaign.sequence.is_some() || campaign.surge_search.is_some() || campaign.on_drift.is_some()
 }
@@ -107,7 +106,6 @@ impl InterruptedRun {
         self.parts.iter().any(|part| part.soaked)
     }
 
-    /// Rejects a run with another identity, or one with no remaining work.
     pub(crate) fn check(
         &mut self,
         campaign: &Campaign,
@@ -139,7 +137,6 @@ impl InterruptedRun {
         Ok(())
     }
 
-    /// The steps that the journal lists and no recording contains, with the file of each; `None` if there are none.
     pub(crate) fn lost_text(&self) -> Option<String> {
         let of_part = |part: &JournalPart| {
             let numbers: Vec<u64> = part
@@ -158,7 +155,6 @@ impl InterruptedRun {
         (!parts.is_empty()).then(|| parts.join(", "))
     }
 
-    /// Whether every step is recorded, so that at most the map is missing.
     pub(crate) fn is_complete(&self, campaign: &Campaign, plan: &Plan) -> bool {
         if depends_on_readings(campaign) {
             // Only a completed run shows that no further step was due.
@@ -211,7 +207,6 @@ impl<'a> MissingSteps<'a> {
         MissingSteps { plan, next, notes: vec![note] }
     }
 
-    /// Rig time that they need, with warm-up and cool-down, s.
     pub(crate) fn duration_s(&self) -> f64 {
         let dwells_s: f64 = self.next.iter().map(|step| step.dwell_s).sum();
         self.plan.warm_up_s + dwells_s + self.plan.cool_down_s

@@ -39,7 +39,6 @@ pub(crate) fn is_recording(path: &Path) -> bool {
     name == RECORDING || number.is_some_and(|number| number.parse::<usize>().is_ok())
 }
 
-/// Whether a file of this name is a result: points, map, report, page, or executed steps of a script.
 pub(crate) fn is_result(name: &str) -> bool {
     [POINTS, BUDGET, REPORT, PAGE, EXECUTED].contains(&name)
         || name.starts_with("map.")

@@ -233,7 +233,6 @@ pub(crate) fn max_age_s(campaign: &Campaign, source: &RigDescription) -> f64 {
     age_s.max(MAX_MISSED_SAMPLES / source.sample_rate_hz.max(1e-3))
 }
 
-/// Checks that every guard the rig requires is present, and that its channel is delivered.
 pub fn check_guards(campaign: &Campaign, rig: &RigDescription) -> Result<(), SessionError> {
     let set = campaign.guard_set();
     let missing: Vec<GuardName> =

@@ -104,7 +104,6 @@ impl RunObserver for Recorder {
 
 pub(crate) struct EventForwarder<'a> {
     pub on_event: OnEvent<'a>,
-    /// Planned steps.
     pub steps: usize,
     /// Planned rig time including soak, s.
     pub duration_s: f64,

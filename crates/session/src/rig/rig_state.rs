@@ -35,14 +35,11 @@ pub fn shared_state_directory() -> PathBuf {
     }
 }
 
-/// Current or last owner of a rig.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Owner {
-    /// Process ID.
     pub process: u32,
     /// Host name; empty if unknown.
     pub host: String,
-    /// Directory of the run.
     pub run: PathBuf,
     /// Start time, as in the name of the run directory.
     pub started: String,
@@ -55,16 +52,13 @@ impl std::fmt::Display for Owner {
     }
 }
 
-/// Reason of a lockout.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lockout {
-    /// What happened.
     pub reason: String,
     /// Directory of the run; empty if it is unknown.
     pub run: PathBuf,
 }
 
-/// Content of a file: the name of its rig, and what is known about the rig.
 #[derive(Serialize, Deserialize)]
 struct Entry<T> {
     rig: String,
@@ -128,7 +122,6 @@ impl RigStates {
         })
     }
 
-    /// Opens a rig's lock; creates it, and the directory, on demand.
     fn open(&self, rig: &str) -> Result<(File, PathBuf), SessionError> {
         make_directory(&self.directory, self.shared)
             .map_err(SessionError::file("create", &self.directory))?;
@@ -174,7 +167,6 @@ impl RigStates {
         Ok(claim)
     }
 
-    /// The lockout of a rig; one that cannot be read still locks the rig out.
     fn lockout_of(&self, rig: &str) -> Option<Lockout> {
         if let Some(reason) = self.doubtful_file(rig) {
             return Some(Lockout { reason, run: PathBuf::new() });
@@ -298,14 +290,12 @@ impl Claim {
         replace().map_err(SessionError::file("write", &self.states.file(&self.rig, "lock")))
     }
 
-    /// Prevents further runs until this lockout is acknowledged.
     pub fn lock_out(&self, lockout: &Lockout) -> Result<(), SessionError> {
         let path = self.states.file(&self.rig, "latch");
         let text = json_text(&Entry { rig: self.rig.clone(), content: lockout })?;
         write_file(&path, text.as_bytes(), Existing::Replaced)
     }
 
-    /// Releases the rig in a safe state.
     pub fn release(mut self) -> Result<(), SessionError> {
         self.write(None)
     }

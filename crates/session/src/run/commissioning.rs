@@ -137,7 +137,6 @@ fn stages(campaign: &Campaign, base: OperatingPoint) -> Vec<Stage> {
     stages
 }
 
-/// The steps about a point, or the first reason against them.
 fn plan_steps(
     campaign: &Campaign,
     declared: &RigActuators,

@@ -14,7 +14,6 @@ const BYTES_PER_VALUE: f64 = 40.0;
 /// Additional free space required, bytes.
 const SPARE_BYTES: f64 = 50e6;
 
-/// Rejects a plan with a setpoint that the rig would refuse during the run.
 pub(crate) fn check_setpoints(plan: &Plan, rig: &RigDescription) -> Result<(), SessionError> {
     let Some(accepts) = &rig.accepts else { return Ok(()) };
     for (place, step) in plan.steps.iter().enumerate() {
@@ -53,7 +52,6 @@ pub(crate) fn check_room(
     }
 }
 
-/// Free bytes of a file system for this user; `None` if unknown.
 #[cfg(unix)]
 fn free_bytes(directory: &Path) -> Option<f64> {
     let file_system = rustix::fs::statvfs(directory).ok()?;
@@ -65,7 +63,6 @@ fn free_bytes(_: &Path) -> Option<f64> {
     None
 }
 
-/// Concerns about the calibrations on the day of a run; errors if the campaign requires them.
 pub(crate) fn calibration_concerns(campaign: &Campaign, model: &Model, day: Option<Date>) -> Vec<Concern> {
     let warnings = forecast_calibration_warnings(campaign, model, day).into_iter();
     let concern = warnings.map(|one| Concern {

@@ -73,7 +73,6 @@ impl<'a> RunRequest<'a> {
 pub struct PreparedRun<'a> {
     request: RunRequest<'a>,
     model: Model,
-    /// The plan to run; for a script, its forecast.
     plan: Plan,
     scripted: Option<ScriptedSteps>,
     sources: Sources,
@@ -280,7 +279,6 @@ impl PreparedRun<'_> {
         Ok((self, RecordedRun { directory, recording, end, parts }))
     }
 
-    /// Removes the files of a run whose rig was not armed, and returns the error of the run.
     fn discard_unarmed_run(&self, error: RunError, directory: &Path) -> SessionError {
         if self.request.resume.is_none() && !error.leaves_rig_state_unknown() {
             // A failure leaves an empty run directory, which is harmless.
@@ -318,7 +316,6 @@ impl PreparedRun<'_> {
         Ok(Some(RunOutcome { directory, recording, end, results }))
     }
 
-    /// Locks the rig and its auxiliary instruments if they can have only one user.
     fn acquire_lease(&self, rig: &RigDescription) -> Result<RigLease, SessionError> {
         let default = self.request.parent.join(".rigs");
         let states = RigStates::new(self.request.rig_states.unwrap_or(&default));
@@ -329,7 +326,6 @@ impl PreparedRun<'_> {
         RigLease::acquire(&states, rig.exclusive.as_deref(), &shared, resumed_directory)
     }
 
-    /// The run directory: a new one with the inputs of the run, or that of the resumed run.
     fn create_directory(&self) -> Result<PathBuf, SessionError> {
         if let Some(interrupted) = &self.request.resume {
             return Ok(interrupted.directory.clone());
@@ -447,7 +443,6 @@ impl PreparedRun<'_> {
         (end, finished, lockout)
     }
 
-    /// The plan as executed; a script's is stored next to its forecast.
     fn executed(&self, directory: &Path) -> Result<Plan, SessionError> {
         let Some(steps) = &self.scripted else { return Ok(self.plan.clone()) };
         let executed = steps.executed(&self.plan);

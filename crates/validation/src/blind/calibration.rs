@@ -69,7 +69,6 @@ impl DiagnosisSummary {
         self.candidates.iter().map(|(_, score)| *score).fold(f64::NEG_INFINITY, f64::max) - self.nothing
     }
 
-    /// Whether the true causes are among the candidates.
     pub(crate) fn is_listed(&self) -> bool {
         matches!(self.kind, CaseKind::None | CaseKind::Outside)
             || self.candidates.iter().any(|(causes, _)| *causes == self.causes)
@@ -306,7 +305,6 @@ const BOUND_TOLERANCE: f64 = 1e-4;
 /// Posterior over prior standard deviation above which the data do not determine a number.
 const MAX_WIDTH_RATIO: f64 = 0.5;
 
-/// The origin of a fitted number with this posterior and prior standard deviation.
 fn of_width(posterior_sigma: f64, prior_sigma: f64) -> Origin {
     if posterior_sigma > MAX_WIDTH_RATIO * prior_sigma { Origin::Prior } else { Origin::Data }
 }

@@ -174,7 +174,6 @@ impl Deck {
     }
 }
 
-/// Signs that an effect can have relative to its typical step.
 fn signs(effect: &Arc<dyn Effect>) -> Vec<f64> {
     let [parameter] = effect.info().parameters.as_slice() else { return vec![1.0] };
     let has = |sign: &f64| {
@@ -341,7 +340,6 @@ fn has_influence(effect: &Arc<dyn Effect>, meter: &dyn SignatureMeter) -> bool {
     })
 }
 
-/// The value at this number of typical steps from neutral, within the range.
 fn value_at(parameter: &EffectParameter, steps: f64) -> f64 {
     (parameter.neutral + steps * parameter.typical_step).clamp(parameter.low, parameter.high)
 }

@@ -190,7 +190,6 @@ fn read(path: &Path) -> Result<Vec<u8>, BlindError> {
     Ok(bytes)
 }
 
-/// Reads the answers if they are unchanged.
 pub(crate) fn open(directory: &Path, manifest: &Manifest) -> Result<Vec<Truth>, BlindError> {
     let path = directory.join(ANSWERS_NAME);
     let bytes = read(&path)?;

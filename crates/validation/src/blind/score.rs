@@ -10,7 +10,6 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// The fields of a diagnosis that are scored.
 #[derive(Debug, Clone, Default, Deserialize)]
 struct Diagnosis {
     verdict: String,

@@ -195,7 +195,6 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// Identified minus mean model efficiency, points; `None` if the method failed.
     pub(crate) fn eta_error_points(&self) -> Option<f64> {
         self.point.eta.map(|eta| 100.0 * (eta - self.eta_mean))
     }
@@ -219,7 +218,6 @@ pub(crate) fn identify_run(run: &Run, config: &IdentifyConfig) -> Result<Outcome
     identify_recording(run, &run.recording, config)
 }
 
-/// Identifies a recording that was made from a run (with noise, say).
 pub(crate) fn identify_recording(
     run: &Run,
     recording: &Recording,
@@ -255,7 +253,6 @@ pub(crate) fn identify_runs(runs: &[Run], config: &IdentifyConfig) -> Result<Vec
     runs.iter().map(|run| identify_run(run, config)).collect()
 }
 
-/// Smallest and largest of the present values; `None` for none.
 pub(crate) fn extremes(values: impl IntoIterator<Item = Option<f64>>) -> Option<(f64, f64)> {
     values.into_iter().flatten().fold(None, |range, value| {
         let (low, high) = range.unwrap_or((value, value));
@@ -263,12 +260,10 @@ pub(crate) fn extremes(values: impl IntoIterator<Item = Option<f64>>) -> Option<
     })
 }
 
-/// Largest size of the present values; 0 for none.
 pub(crate) fn worst(values: impl IntoIterator<Item = Option<f64>>) -> f64 {
     values.into_iter().flatten().fold(0.0, |worst, value| worst.max(value.abs()))
 }
 
-/// Root mean square of the present values; `None` for none.
 pub(crate) fn rms(values: impl IntoIterator<Item = Option<f64>>) -> Option<f64> {
     statistics::rms(values.into_iter().flatten())
 }
@@ -387,14 +382,12 @@ pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// As [`fixed`], with a plus sign for positive values.
 pub(crate) fn signed(value: f64, decimals: usize) -> String {
     let text = fixed(value, decimals);
     let zero = text.chars().all(|c| c == '0' || c == '.' || c == '-');
     if zero || text.starts_with('-') { text } else { format!("+{text}") }
 }
 
-/// As [`signed`]; `-` for a missing value.
 pub(crate) fn signed_or_dash(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".to_owned(), |value| signed(value, decimals))
 }

@@ -6,17 +6,14 @@ use mapper_chart::{Axis, Colour, Dash, Line, Marker, Panel, Scatter, palette};
 use mapper_numerics::statistics::range;
 use mapper_report::{Table, markdown_table};
 
-/// Colour of a target speed: ordered, slow to fast.
 pub(crate) fn speed_colour(speed_rpm: f64) -> Colour {
     palette::sequential((speed_rpm - 50e3) / 100e3)
 }
 
-/// `110 krpm`.
 pub(crate) fn krpm(speed_rpm: f64) -> String {
     format!("{:.0} krpm", speed_rpm / 1e3)
 }
 
-/// Target speeds of table 1, slow to fast.
 pub(crate) fn target_speeds_rpm() -> [f64; 4] {
     let mut speeds = JUMPS.map(|(_, to_rpm)| to_rpm);
     speeds.sort_by(f64::total_cmp);
@@ -46,7 +43,6 @@ fn equality_panel(title: &str, axis: (&str, &str), band: Option<(f64, &str)>, se
     panel
 }
 
-/// Efficiency in %: model (mean in the window) and identified, for outcomes with a result.
 pub(crate) fn efficiency_pair(outcome: &Outcome) -> Option<(f64, f64)> {
     Some((100.0 * outcome.eta_mean, 100.0 * outcome.point.eta?))
 }
@@ -78,7 +74,6 @@ pub(crate) fn series_by_speed(
     target_speeds_rpm().map(series).to_vec()
 }
 
-/// One series for each of several cases, with its label.
 pub(crate) fn series_by_case<'a>(
     cases: impl Iterator<Item = (&'a Vec<Outcome>, String)>,
     markers: [Marker; 5],
@@ -95,7 +90,6 @@ pub(crate) fn series_by_case<'a>(
         .collect()
 }
 
-/// Smallest and largest value of the outcomes at one target speed, as text.
 pub(crate) fn span_at_speed(
     outcomes: &[Outcome],
     speed_rpm: f64,

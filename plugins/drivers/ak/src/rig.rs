@@ -21,7 +21,6 @@ const PLAUSIBLE: SetpointRanges = SetpointRanges {
     oil_temperature_k: SetpointRange { low: 200.0, high: 500.0 },
 };
 
-/// Creates the backend without connecting.
 pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let (settings, requests) = Settings::read(value)?;
     Ok(Box::new(Instrument { settings, requests, stream: None, armed: None }))
@@ -42,7 +41,6 @@ enum RequestError {
 struct Armed {
     sequence: u64,
     last_s: f64,
-    /// The last reported error status.
     error: u8,
     silent: Outage,
 }

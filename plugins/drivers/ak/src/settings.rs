@@ -55,7 +55,6 @@ fn default_scale() -> f64 {
     1.0
 }
 
-/// Why settings are rejected.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SettingError {
     #[error("{0}; docs/how-to/rig.md has an example of all settings")]
@@ -130,12 +129,10 @@ impl Settings {
         }
     }
 
-    /// Samples per second, Hz.
     pub(crate) fn rate_hz(&self) -> f64 {
         self.rate.as_ref().map_or(2.0, |rate| rate.value)
     }
 
-    /// Timeout of an answer, s.
     pub(crate) fn timeout_s(&self) -> f64 {
         self.timeout.as_ref().map_or(0.3, |timeout| timeout.value)
     }

@@ -183,7 +183,6 @@ pub(crate) struct ImplausibleReading {
     low: f64,
     high: f64,
     source_text: String,
-    /// The others.
     others: Vec<Channel>,
     remedy: String,
 }

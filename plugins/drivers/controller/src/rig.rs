@@ -117,7 +117,6 @@ struct Armed {
     heartbeat: u16,
     /// Time of the last heartbeat, s.
     last_heartbeat_s: f64,
-    /// Readings already reported as not good, with the reason.
     reported: BTreeSet<(Channel, Quality, String)>,
     unread: Outage,
     unsent_heartbeats: Outage,
@@ -158,7 +157,6 @@ impl<C: Controller> Rig<C> {
         armed.unsent_heartbeats.update("heartbeats that the controller did not accept", until_s, failure)
     }
 
-    /// Reports once that the watchdog of the controller has cut the air.
     fn report_trip(&mut self, until_s: f64) -> Option<Event> {
         let armed = self.armed.as_mut()?;
         let since_s = armed.accepted_heartbeat_s.filter(|since_s| until_s - since_s > HEARTBEAT_LOST_S)?;
@@ -169,7 +167,6 @@ impl<C: Controller> Rig<C> {
         Some(Event { t_s: until_s, kind: EventKind::RigTripped, message })
     }
 
-    /// Reports the channels whose readings are not good, once for each quality and reason.
     fn report_bad_readings(&mut self, readings: &BTreeMap<Channel, Reading>) -> Option<String> {
         let reported = &mut self.armed.as_mut()?.reported;
         let bad_readings = readings.iter().filter(|(_, reading)| reading.quality != Quality::Good);
@@ -217,7 +214,6 @@ fn command(channel: Channel, setpoints: Option<Setpoints>) -> f64 {
     }
 }
 
-/// Provenance of the readings that are not plain good ones.
 fn provenance(readings: &BTreeMap<Channel, Reading>, t_s: f64) -> Vec<Provenance> {
     let needs_provenance =
         |reading: &Reading| reading.source_t_s.is_some() || reading.quality != Quality::Good;

@@ -4,7 +4,6 @@ use mapper_core::{Backend, BackendError, RigDescription, Setpoints};
 use mapper_driver_host::protocol::LEASE_S;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// An armed rig.
 pub(crate) struct Armed {
     /// On the driver's clock, s.
     pub(crate) at_s: f64,
@@ -93,11 +92,8 @@ pub(crate) struct Descent {
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum DescentState {
-    /// No command is due.
     NothingDue,
-    /// The due command was sent.
     CommandSent,
-    /// The rig has confirmed its safe state.
     Safe,
     /// The rig does not confirm its safe state; the command is repeated.
     NotConfirmed(String),
@@ -109,7 +105,6 @@ impl Descent {
         Descent { from, begun_s: now_s, due_s: now_s, cut: false }
     }
 
-    /// Sends the command that is due at this run time, s.
     fn execute_step(
         &mut self,
         rig: &mut dyn Backend,

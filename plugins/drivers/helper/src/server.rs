@@ -15,7 +15,6 @@ pub(crate) type OpenRig = Box<dyn FnOnce(&Value) -> Result<Box<dyn Backend>, Bac
 /// Maximum run time of a simulated rig, s: beyond it the steps of a run-down would be lost to rounding.
 const MAX_RUN_TIME_S: f64 = 1e9;
 
-/// A driver, from hello to the end.
 pub(crate) struct Server {
     name: &'static str,
     version: &'static str,
@@ -50,7 +49,6 @@ impl Server {
         self.frame_limit_bytes
     }
 
-    /// Whether serving is over: the host has disconnected, and the rig is safe.
     pub(crate) fn is_over(&self) -> bool {
         self.is_leaving && self.armed.is_none()
     }
@@ -199,7 +197,6 @@ impl Server {
         Ok(json!({}))
     }
 
-    /// Disarms the rig, unless it has not confirmed its safe state.
     fn disarm(&mut self) -> Result<Value, Refusal> {
         let (.., armed) = self.armed_rig()?;
         if armed.commanded.is_some() || armed.descent.is_some() {

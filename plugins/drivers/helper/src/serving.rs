@@ -17,17 +17,14 @@ pub(crate) const QUEUE_LENGTH: usize = 256;
 const MAX_WAIT_S: f64 = 3600.0;
 
 pub(crate) enum DriverEvent {
-    /// A host has connected to the socket.
     #[cfg(unix)]
     Connected(std::os::unix::net::UnixStream),
     Message(Box<Message>),
     /// The host has disconnected, or sent an invalid frame.
     Closed,
-    /// A signal requests termination.
     Terminate,
 }
 
-/// Serves this host. Returns whether a signal requested termination meanwhile.
 pub(crate) fn serve_one(mut server: Server, events: &Receiver<DriverEvent>, output: &OutputQueue) -> bool {
     let start = Instant::now();
     let now_s = || start.elapsed().as_secs_f64();
@@ -61,7 +58,6 @@ pub(crate) fn serve_one(mut server: Server, events: &Receiver<DriverEvent>, outp
     terminate
 }
 
-/// A unique name of a session of this driver: its process and start time.
 pub(crate) fn new_session_name() -> String {
     let since = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
     format!("{}-{}", std::process::id(), since.as_nanos())
@@ -84,7 +80,6 @@ fn send(server: &mut Server, output: &OutputQueue) {
     }
 }
 
-/// Forwards the host's messages, and finally that it has disconnected.
 pub(crate) fn forward_messages(
     mut host: impl Read + Send + 'static,
     sender: SyncSender<DriverEvent>,
@@ -132,7 +127,6 @@ const MAX_WAITING: usize = 256;
 /// its answer arrives.
 const RESERVED: usize = 64;
 
-/// The queue before the pipe to the host.
 pub(crate) struct OutputQueue {
     to_write: SyncSender<Vec<u8>>,
     waiting: Arc<AtomicUsize>,

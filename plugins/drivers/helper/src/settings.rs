@@ -112,7 +112,6 @@ pub(crate) fn write_result(value: &impl serde::Serialize) -> Result<Value, Refus
     serde_json::to_value(value).map_err(|error| refusal(Code::Failed, error.to_string()))
 }
 
-/// Calls the author's code and returns its errors and panics as refusals.
 pub(crate) fn call_author_code<T>(call: impl FnOnce() -> Result<T, BackendError>) -> Result<T, Refusal> {
     match catch_unwind(AssertUnwindSafe(call)) {
         Ok(answer) => answer.map_err(|error| Box::new(write_error(&error))),

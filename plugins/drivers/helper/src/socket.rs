@@ -96,7 +96,6 @@ fn accept_hosts(listener: &UnixListener, sender: &SyncSender<DriverEvent>, busy:
     }
 }
 
-/// Answers the first request with a refusal.
 fn refuse_host(mut host: UnixStream) {
     let timed = host
         .set_read_timeout(Some(REFUSAL_TIMEOUT))

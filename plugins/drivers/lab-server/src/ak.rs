@@ -18,7 +18,6 @@ fn number(reading: Option<f64>) -> String {
     reading.map_or_else(|| "#0".to_owned(), |value| value.to_string())
 }
 
-/// The answer to the text between STX and ETX.
 fn answer(stand: &Stand, body: &[u8]) -> Vec<u8> {
     let Ok((code, channel, _)) = parse_request(body) else { return write_answer(None, &[]) };
     let channels = measured();
@@ -56,7 +55,6 @@ async fn serve_client(mut stream: TcpStream, stand: Arc<Mutex<Stand>>) -> std::i
     }
 }
 
-/// Serves until the listener fails.
 pub async fn serve(listener: TcpListener, stand: Arc<Mutex<Stand>>) -> std::io::Result<()> {
     let permits = Arc::new(tokio::sync::Semaphore::new(CONNECTIONS));
     loop {

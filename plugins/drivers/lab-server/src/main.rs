@@ -113,7 +113,6 @@ fn make(arguments: &Arguments) -> Result<Stand, LabError> {
     Ok(Stand::new(lab, campaign.limits.speed_max_rpm, arguments.speed)?)
 }
 
-/// Starts listening and returns the address.
 fn listen(
     runtime: &Runtime,
     arguments: &Arguments,

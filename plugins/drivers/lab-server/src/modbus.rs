@@ -105,7 +105,6 @@ impl Service for Registers {
     }
 }
 
-/// Serves until the listener fails.
 pub async fn serve(listener: TcpListener, stand: Arc<Mutex<Stand>>) -> std::io::Result<()> {
     let server = Server::new(listener);
     let registers = |_| Ok(Some(Registers(stand.clone())));

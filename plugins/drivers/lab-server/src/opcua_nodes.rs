@@ -26,7 +26,6 @@ const TICKS_HZ: f64 = 1e7;
 /// Environment variables of user and password, as in the example of docs/how-to/rig.md, so that server and driver share them.
 const USER: (&str, &str) = ("PLC_USER", "PLC_PASSWORD");
 
-/// Why the server cannot start.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
     #[error("{} is set and {} is not: set both, or neither for anonymous sessions", .0, .1)]
@@ -48,7 +47,6 @@ pub struct Shared {
 }
 
 impl Shared {
-    /// A value of the stand with its timestamp.
     fn value(&self, read: impl Fn(&Stand) -> Option<Variant>) -> Result<DataValue, StatusCode> {
         let stand = self.stand.lock().map_err(|_| StatusCode::BadInternalError)?;
         let age_s = (self.begun.elapsed().as_secs_f64() - stand.wall_s()).clamp(0.0, 60.0);
@@ -107,7 +105,6 @@ fn directory() -> Result<PathBuf, ServeError> {
     Ok(path)
 }
 
-/// The permitted user; `None`: anonymous.
 fn user() -> Result<Option<(String, String)>, ServeError> {
     let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
     match (variable(USER.0), variable(USER.1)) {
@@ -126,7 +123,6 @@ pub enum Protection {
     Clear,
 }
 
-/// Describes the permitted users, without name or password.
 pub fn describe_users(protection: Protection) -> Result<String, ServeError> {
     Ok(match (protection, user()?) {
         (Protection::Clear, _) => {
@@ -260,7 +256,6 @@ fn add_nodes(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
     Ok(())
 }
 
-/// Makes a server for this address; it listens once it is run.
 pub fn make(at: SocketAddr, shared: &Shared, protection: Protection) -> Result<Server, ServeError> {
     let (server, handle) = builder(at, &directory()?, protection)?.build().map_err(ServeError::NotBuilt)?;
     add_nodes(&handle, shared)?;

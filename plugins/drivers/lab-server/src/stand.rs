@@ -23,7 +23,6 @@ pub fn measured() -> Vec<Channel> {
 /// The setpoints, in the order of registers.
 pub const SETPOINTS: [Target; 4] = [Target::P3, Target::T3, Target::Valve, Target::OilTemperature];
 
-/// A quantity that clients write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Target {
     /// Pa.
@@ -152,7 +151,6 @@ impl Stand {
         self.wall_s
     }
 
-    /// The reason of the trip, until it is acknowledged.
     pub fn tripped(&self) -> Option<&str> {
         self.tripped.as_deref()
     }
@@ -162,7 +160,6 @@ impl Stand {
         self.tripped.get_or_insert(why);
     }
 
-    /// Advances the lab to this wall time, s since the beginning.
     pub fn advance(&mut self, wall_s: f64) -> Result<(), BackendError> {
         self.wall_s = wall_s;
         let silent_s = wall_s - self.last_heartbeat_s;

@@ -10,12 +10,10 @@ use std::fs::File;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// The lab behind the settings of the driver.
 pub(crate) struct RehearsalRig {
     pub(crate) lab: Box<dyn Backend>,
     /// Whether its samples arrive unrequested, in wall time, as those of a physical rig.
     pub(crate) real_time: bool,
-    /// File with a line for each command.
     pub(crate) log: Option<File>,
     /// Run time of the last poll, s.
     now_s: f64,
@@ -75,16 +73,12 @@ impl Backend for RehearsalRig {
 /// Name of the driver.
 pub(crate) const NAME: &str = "lab";
 
-/// The settings below `lab` in a campaign.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Settings {
-    /// The campaign that defines machine, sensors and built-in backend.
     campaign: PathBuf,
-    /// Whether the lab runs in wall time.
     #[serde(default)]
     real_time: bool,
-    /// A file that gets a line for each command.
     command_log: Option<PathBuf>,
 }
 

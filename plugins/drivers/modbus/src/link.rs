@@ -15,13 +15,10 @@ use tokio_modbus::prelude::{ExceptionCode, Request, Response, Slave};
 
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum LinkError {
-    /// The answer is late.
     #[error("{address} did not answer within {} ms (`timeout`, at most 800 ms; slower controllers are not supported)", within.as_millis())]
     Late { address: SocketAddr, within: Duration },
-    /// The connection failed.
     #[error("{address}: {reason}")]
     Failed { address: SocketAddr, reason: String },
-    /// The controller refuses.
     #[error("{address} refuses {operation}: {reason}")]
     Refused { address: SocketAddr, operation: String, code: ExceptionCode, reason: String },
 }
@@ -39,29 +36,24 @@ impl LinkError {
 /// Delay before a busy controller is asked for a second time.
 const RETRY_DELAY: Duration = Duration::from_millis(40);
 
-/// A table of registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Table {
     /// Holding registers (read and write).
     Holding,
-    /// Input registers.
     Input,
 }
 
-/// A connection that is opened on demand.
 pub(crate) struct Link {
     runtime: Runtime,
     address: SocketAddr,
     unit: u8,
     within: Duration,
-    /// Deadline of the current group of writes.
     deadline: Option<Instant>,
     connection: Option<Context>,
 }
 
 impl Link {
-    /// Does not connect yet.
     pub(crate) fn new(address: SocketAddr, unit: u8, within: Duration) -> std::io::Result<Link> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         Ok(Link { runtime, address, unit, within, deadline: None, connection: None })
@@ -80,7 +72,6 @@ impl Link {
         done
     }
 
-    /// Time left for a request, at most its own timeout.
     fn time_left(&self) -> Duration {
         let left = self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
         left.map_or(self.within, |left| left.min(self.within))
@@ -158,13 +149,11 @@ impl Link {
         Err(LinkError::Failed { address: self.address, reason })
     }
 
-    /// A short delay for a busy controller.
     fn pause(&self) {
         let pause = RETRY_DELAY.min(self.time_left());
         self.runtime.block_on(async { tokio::time::sleep(pause).await });
     }
 
-    /// Describes an exception with its number, as manuals list it, and with the unit if that is the cause.
     fn describe_exception(&self, code: ExceptionCode) -> String {
         let number = u8::from(code);
         match code {

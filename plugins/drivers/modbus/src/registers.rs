@@ -7,10 +7,8 @@ const MAX_REGISTERS: u16 = 125;
 /// Maximum gap of unused registers that is read along: cheaper than another request.
 const MAX_GAP: u16 = 8;
 
-/// Neighbouring registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Block {
-    /// Address of the first one.
     pub(crate) start: u16,
     pub(crate) count: u16,
 }

@@ -9,7 +9,6 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Makes the rig without connecting.
 pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let settings = Settings::read(value)?;
     let within = Duration::from_secs_f64(settings.timeout_s());
@@ -29,7 +28,6 @@ struct Registers {
     settings: Settings,
     link: Link,
     blocks: Vec<(Table, Block)>,
-    /// Register contents of the last read.
     last: BTreeMap<(Table, u16), u16>,
 }
 
@@ -57,7 +55,6 @@ impl Registers {
 /// Time for the writes of one call, retries included: the host waits for 2 s.
 const WRITES_WITHIN: std::time::Duration = std::time::Duration::from_millis(1700);
 
-/// Why the rig was lost.
 #[derive(Debug, thiserror::Error)]
 enum RegisterError {
     #[error(transparent)]

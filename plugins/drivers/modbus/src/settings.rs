@@ -32,20 +32,14 @@ pub(crate) struct Settings {
     pub(crate) rate: Option<Quantity<Frequency>>,
     /// Timeout of each request; default 200 ms.
     pub(crate) timeout: Option<Quantity<Duration>>,
-    /// Word order of a number.
     #[serde(default)]
     pub(crate) words: Order,
-    /// Byte order of a word.
     #[serde(default)]
     pub(crate) bytes: Order,
-    /// Location of each channel.
     #[serde(deserialize_with = "mapper_driver::by_channel")]
     pub(crate) read: BTreeMap<Channel, RegisterSettings>,
-    /// Location of each setpoint.
     pub(crate) write: WriteSettings<RegisterSettings>,
-    /// Accepted setpoints.
     pub(crate) accepts: AcceptedRanges,
-    /// The safe trajectory.
     pub(crate) safe: SafeSettings,
 }
 
@@ -77,7 +71,6 @@ fn holding() -> Table {
     Table::Holding
 }
 
-/// Why settings are rejected.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SettingError {
     #[error("{0}; docs/how-to/rig.md has an example of all settings")]
@@ -107,7 +100,6 @@ fn bound(path: &str, value: f64, unit: &'static str, low: f64, high: f64) -> Res
 }
 
 impl Settings {
-    /// Reads and checks them.
     pub(crate) fn read(value: &Value) -> Result<Settings, BackendError> {
         let settings: Settings = serde_path_to_error::deserialize(value).map_err(|error| {
             let path = error.path().to_string();
@@ -117,12 +109,10 @@ impl Settings {
         Ok(settings)
     }
 
-    /// Time for a request, s.
     pub(crate) fn timeout_s(&self) -> f64 {
         self.timeout.as_ref().map_or(0.2, |timeout| timeout.value)
     }
 
-    /// The stand for these settings.
     pub(crate) fn stand(&self) -> Stand {
         Stand {
             backend: NAME,
@@ -199,19 +189,16 @@ impl Settings {
             .map(drop)
     }
 
-    /// The register contents for a value, SI.
     pub(crate) fn registers(&self, entry: &RegisterSettings, value: f64) -> Option<Vec<u16>> {
         entry.form.registers((value - entry.offset) / entry.scale, self.words, self.bytes)
     }
 
-    /// The value in registers, SI; NaN without a value.
     pub(crate) fn value(&self, entry: &RegisterSettings, registers: &[u16]) -> f64 {
         entry.value(registers, self.words, self.bytes)
     }
 }
 
 impl RegisterSettings {
-    /// Its registers.
     pub(crate) fn registers(&self) -> std::ops::Range<u16> {
         self.register..self.register.saturating_add(self.form.count())
     }

@@ -69,7 +69,6 @@ pub(crate) enum LinkError {
     Store(#[from] StoreError),
 }
 
-/// An event of the connection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum State {
     Connecting,
@@ -78,7 +77,6 @@ enum State {
 }
 
 pub(crate) struct Answer {
-    /// One value for each requested node.
     pub(crate) values: Vec<DataValue>,
     /// Time of sending, by the server's own clock.
     pub(crate) sent: DateTime,
@@ -162,7 +160,6 @@ fn is_refusal(status: StatusCode) -> bool {
 }
 
 impl Link {
-    /// Does not connect yet.
     pub(crate) fn new(
         endpoint: String,
         security: Security,
@@ -182,7 +179,6 @@ impl Link {
         LinkError::Failed { server: self.server(), message: message.into() }
     }
 
-    /// The endpoint with the requested security and the pinned certificate.
     fn choose(
         &self,
         store: &Store,
@@ -289,7 +285,6 @@ impl Link {
         }
     }
 
-    /// Waits for the connection. On timeout, returns the last error.
     fn wait(&mut self, within: Duration) -> Result<(), Option<StatusCode>> {
         let Some(open) = &mut self.open else { return Err(None) };
         let connected = async {
@@ -430,7 +425,6 @@ impl Drop for Link {
     }
 }
 
-/// Whether a new connection may succeed.
 fn is_temporary(error: &Error) -> bool {
     [
         StatusCode::BadNotConnected,

@@ -25,7 +25,6 @@ pub(crate) async fn check_reachable(server: &str) -> std::io::Result<()> {
     TcpStream::connect(place).await.map(drop)
 }
 
-/// Logs in and out immediately.
 pub(crate) async fn try_login(
     client: &Client,
     endpoint: &EndpointDescription,

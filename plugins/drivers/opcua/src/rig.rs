@@ -22,7 +22,6 @@ const MAX_CLOCK_DIFFERENCE_S: f64 = 1.0;
 /// Write bit of an access level.
 const WRITABLE: u8 = 2;
 
-/// Makes the rig without connecting.
 pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let mut checked = Settings::read(value)?;
     let within = Duration::from_secs_f64(checked.settings.timeout_s());
@@ -40,7 +39,6 @@ struct Nodes {
     link: Link,
     /// Nodes to read, in the order of `checked.reads`.
     nodes: Vec<NodeId>,
-    /// Types of the written nodes.
     types: BTreeMap<Target, Variant>,
     /// Type of the first number of each node that is read.
     kinds: BTreeMap<Channel, String>,
@@ -58,7 +56,6 @@ fn between_s(earlier: &DateTime, later: &DateTime) -> f64 {
     (later.ticks() - earlier.ticks()) as f64 * 1e-7
 }
 
-/// Whether the status means that the node is missing permanently.
 fn is_permanent(status: StatusCode) -> bool {
     [
         StatusCode::BadNodeIdUnknown,
@@ -71,7 +68,6 @@ fn is_permanent(status: StatusCode) -> bool {
 }
 
 impl Nodes {
-    /// Reports a difference of the server's clock.
     fn compare_clocks(&mut self, sent: &DateTime) {
         let off_s = between_s(&DateTime::now(), sent);
         if off_s.abs() > MAX_CLOCK_DIFFERENCE_S && !sent.is_null() {
@@ -197,7 +193,6 @@ impl Nodes {
         }
     }
 
-    /// Learns types and access of the written nodes.
     fn read_types(&mut self) -> Result<(), LinkError> {
         let written: Vec<(Target, NodeId)> =
             self.checked.written().map(|(target, node)| (target, node.clone())).collect();

@@ -21,7 +21,6 @@ pub(crate) const NAME: &str = "opcua";
 pub(crate) struct Settings {
     /// Address of the server, `opc.tcp://HOST:PORT/...`.
     pub(crate) endpoint: String,
-    /// Security of the connection.
     #[serde(default)]
     pub(crate) security: Security,
     /// User name: `{env: NAME}`. Default: anonymous.
@@ -39,18 +38,13 @@ pub(crate) struct Settings {
     /// The time that defines the age of a reading.
     #[serde(default)]
     pub(crate) timestamps: Timestamps,
-    /// Location of each channel.
     #[serde(deserialize_with = "mapper_driver::by_channel")]
     pub(crate) read: BTreeMap<Channel, NodeSettings>,
-    /// Location of each setpoint.
     pub(crate) write: WriteSettings<NodeSettings>,
-    /// Accepted setpoints.
     pub(crate) accepts: AcceptedRanges,
-    /// The safe trajectory.
     pub(crate) safe: SafeSettings,
 }
 
-/// Whether this is a valid server address.
 pub(crate) fn is_endpoint(text: &str) -> bool {
     text.strip_prefix("opc.tcp://").is_some_and(|server| !server.is_empty())
 }
@@ -103,7 +97,6 @@ fn node_id<'de, D: serde::Deserializer<'de>>(from: D) -> Result<NodeId, D::Error
     })
 }
 
-/// Why settings are rejected.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SettingError {
     #[error("{0}; docs/how-to/rig.md has an example of all settings")]
@@ -138,7 +131,6 @@ pub(crate) fn settings_error(path: impl Into<String>, error: impl Into<SettingEr
     BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(error.into()) }
 }
 
-/// Conversion of a node's number to SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Scale {
     scale: f64,
@@ -172,7 +164,6 @@ fn kind(channel: Channel) -> Option<Kind> {
 }
 
 impl NodeSettings {
-    /// Conversion of a node's number to the value of a channel.
     fn scale(&self, channel: Channel) -> Result<Scale, SettingError> {
         let Some(unit) = &self.unit else {
             let scale = check_scale(self.scale.unwrap_or(1.0))?;
@@ -198,7 +189,6 @@ pub(crate) struct User {
     pub(crate) password: String,
 }
 
-/// Checked settings.
 pub(crate) struct CheckedSettings {
     pub(crate) settings: Settings,
     pub(crate) user: Option<User>,
@@ -207,7 +197,6 @@ pub(crate) struct CheckedSettings {
 }
 
 impl Settings {
-    /// Reads and checks them.
     pub(crate) fn read(value: &Value) -> Result<CheckedSettings, BackendError> {
         let settings: Settings = serde_path_to_error::deserialize(value).map_err(|error| {
             let path = error.path().to_string();
@@ -260,12 +249,10 @@ impl Settings {
         Ok(CheckedSettings { settings: self, user, reads, writes })
     }
 
-    /// Time for a read, s.
     pub(crate) fn timeout_s(&self) -> f64 {
         self.timeout.as_ref().map_or(0.3, |timeout| timeout.value)
     }
 
-    /// The stand for these settings.
     pub(crate) fn stand(&self) -> Stand {
         Stand {
             backend: NAME,
@@ -291,7 +278,6 @@ fn unit_channel(target: Target) -> Channel {
 }
 
 impl CheckedSettings {
-    /// Unit of a channel, as written in the campaign.
     pub(crate) fn unit(&self, channel: Channel) -> String {
         let Some(entry) = self.settings.read.get(&channel) else { return String::new() };
         match &entry.unit {
@@ -307,7 +293,6 @@ impl CheckedSettings {
         self.writes.get(&target)
     }
 
-    /// Every written node.
     pub(crate) fn written(&self) -> impl Iterator<Item = (Target, &NodeId)> {
         self.writes.iter().map(|(target, (node, _))| (*target, node))
     }

@@ -55,12 +55,10 @@ impl Store {
         Ok(Store { root: state.ok_or(StoreError::NoDirectory)?.join(DIRECTORY) })
     }
 
-    /// Its directory.
     pub(crate) fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Our own certificate; it is created if missing.
     pub(crate) fn own(&self) -> Result<PathBuf, StoreError> {
         let store = CertificateStore::new(&self.root);
         let (certificate, key) = (store.own_certificate_path(), store.own_private_key_path());
@@ -96,7 +94,6 @@ impl Store {
         self.root.join("servers").join(format!("{name}.der"))
     }
 
-    /// The pinned certificate of a server, still valid.
     pub(crate) fn pinned(&self, endpoint: &str) -> Result<X509, StoreError> {
         let Some(certificate) = self.trusted(endpoint)? else {
             return Err(StoreError::NotTrusted(endpoint.to_owned()));
@@ -105,7 +102,6 @@ impl Store {
         Ok(certificate)
     }
 
-    /// The trusted certificate; `None` if there is none.
     pub(crate) fn trusted(&self, endpoint: &str) -> Result<Option<X509>, StoreError> {
         let path = self.pin(endpoint);
         if !path.exists() {
@@ -125,7 +121,6 @@ impl Store {
     }
 }
 
-/// Checks that this certificate is valid today.
 pub(crate) fn valid(endpoint: &str, certificate: &X509) -> Result<(), StoreError> {
     let refused = |error: opcua::types::Error| StoreError::Expired {
         server: server(endpoint).to_owned(),
@@ -152,7 +147,6 @@ fn about(valid_days: u32) -> X509Data {
     }
 }
 
-/// Host and port of an endpoint.
 pub(crate) fn server(endpoint: &str) -> &str {
     let after = endpoint.strip_prefix("opc.tcp://").unwrap_or(endpoint);
     after.split('/').next().unwrap_or(after)
@@ -182,7 +176,6 @@ pub(crate) fn number(value: &Variant) -> f64 {
     }
 }
 
-/// The specification's name of a value's type.
 pub(crate) fn type_name(value: &Variant) -> String {
     match value.type_id() {
         VariantTypeId::Empty => "empty".to_owned(),
@@ -191,7 +184,6 @@ pub(crate) fn type_name(value: &Variant) -> String {
     }
 }
 
-/// Whether the type is numeric, which excludes Boolean.
 pub(crate) fn is_number(value: &Variant) -> bool {
     !matches!(value, Variant::Boolean(_))
         && (matches!(value, Variant::Float(_) | Variant::Double(_)) || !number(value).is_nan())

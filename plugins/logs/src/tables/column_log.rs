@@ -40,7 +40,6 @@ impl Chunk {
 
 /// A source of columns, some rows at a time.
 pub(crate) trait Chunks {
-    /// The next rows of each column, and their number; `None` at the end.
     fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError>;
 }
 
@@ -62,7 +61,6 @@ impl<C: Chunks> ColumnRows<C> {
         ColumnRows { chunks, head, head_at: 0, chunk: Vec::new(), count: 0, at: 0 }
     }
 
-    /// Up to this many rows as text, from here on.
     pub(crate) fn texts(&mut self, rows: usize) -> Result<Vec<Vec<String>>, LogError> {
         let mut found = Vec::new();
         while found.len() < rows && self.advance()? {
@@ -106,15 +104,11 @@ impl<C: Chunks> Rows for ColumnRows<C> {
     }
 }
 
-/// Columns of equal length.
 pub(crate) struct ColumnTable {
-    /// Title in messages.
     pub(crate) title: String,
-    /// Names, and units if any is known.
     pub(crate) head: Vec<Vec<String>>,
     pub(crate) rows: usize,
     pub(crate) columns: Vec<Chunk>,
-    /// The column that the file marks as independent.
     pub(crate) clock: Option<String>,
 }
 
@@ -191,7 +185,6 @@ impl Log for ColumnLog {
     }
 }
 
-/// All rows at once.
 struct Once(Option<(usize, Vec<Chunk>)>);
 
 impl Chunks for Once {

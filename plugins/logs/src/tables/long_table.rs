@@ -19,19 +19,16 @@ const MAX_FURTHER_NUMBERS: usize = 2;
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LongForm {
-    /// Time, in one column or in two.
     clock: Vec<usize>,
     name: usize,
     value: usize,
     data_row: usize,
     /// Header of the table with a column for each quantity: the clock, then names with units.
     header: Vec<String>,
-    /// The quantities in the order of their columns.
     names: Vec<String>,
 }
 
 impl LongForm {
-    /// Recognises a table in long form; `table` is the analysis of the unchanged sample.
     pub(crate) fn find(rows: &[Vec<String>], table: &Table, decimal: u8) -> Option<LongForm> {
         let data_row = table.data_row();
         let data = rows.get(data_row..)?;
@@ -78,14 +75,12 @@ impl LongForm {
         Some(LongForm { clock, name, value, data_row, header: wide_header, names })
     }
 
-    /// Describes the form.
     pub(crate) fn finding(&self, rows: &[Vec<String>]) -> LogFinding {
         let header = self.data_row.checked_sub(1).and_then(|row| rows.get(row));
         let cell = |at: usize| header.and_then(|row| row.get(at)).cloned().unwrap_or_default();
         LogFinding::LongForm { name: cell(self.name), value: cell(self.value), quantities: self.names.len() }
     }
 
-    /// The sample with a column for each quantity.
     pub(crate) fn wide(&self, rows: &[Vec<String>]) -> Vec<Vec<String>> {
         let mut gathered = WideRow::new(self);
         let mut wide = vec![self.header.clone()];
@@ -97,7 +92,6 @@ impl LongForm {
     }
 }
 
-/// A row of the wide table that is being collected: the time, then the values.
 struct WideRow {
     row: Vec<String>,
     filled: bool,
@@ -126,7 +120,6 @@ impl WideRow {
         done
     }
 
-    /// Takes the last row, if there is any.
     fn finish(&mut self) -> Option<Vec<String>> {
         let empty = vec![String::new(); self.row.len()];
         let row = std::mem::replace(&mut self.row, empty);
@@ -134,7 +127,6 @@ impl WideRow {
     }
 }
 
-/// Rows of the wide table of a file in long form.
 pub(crate) struct LongRows {
     stream: RowStream,
     form: LongForm,
@@ -192,7 +184,6 @@ impl Rows for LongRows {
     }
 }
 
-/// A table of the file.
 #[derive(Debug)]
 pub(crate) struct Part {
     pub(crate) name: String,

@@ -26,7 +26,6 @@ pub(crate) type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError
 /// Opens a file from its start: its schema and its batches.
 pub(crate) type OpenBatches = fn(&LogFile) -> Result<(Schema, Batches), LogError>;
 
-/// A table of samples as one batch; a missing value is null.
 pub(crate) fn batch_of(table: &SampleTable) -> Result<RecordBatch, ArrowError> {
     let mut fields = vec![Field::new(SampleTable::TIME, DataType::Float64, false)];
     let mut columns: Vec<Arc<dyn Array>> = vec![Arc::new(Float64Array::from(table.times_s.clone()))];

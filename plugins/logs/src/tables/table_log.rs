@@ -15,7 +15,6 @@ struct GroupReader {
     values: Vec<f64>,
 }
 
-/// A row with columns that have their unit after each number.
 struct CellsWithUnits<'a> {
     row: &'a dyn Rows,
     units: &'a BTreeMap<usize, String>,
@@ -42,7 +41,6 @@ impl Cells for CellsWithUnits<'_> {
 pub(crate) struct Table {
     pub(crate) layout: Layout,
     clocks: Clocks,
-    /// Column of the table for each column of the layout.
     sources: Vec<usize>,
     data_row: usize,
     missing: Vec<f64>,
@@ -98,7 +96,6 @@ impl Table {
         Ok(Table { layout, clocks, sources, data_row, missing: options.missing.clone(), cell_units })
     }
 
-    /// Columns of the table with dates, times or counts.
     pub(crate) fn clock_columns(&self) -> Vec<usize> {
         let of = self.clocks.group_of.iter().enumerate();
         of.filter(|(_, group)| group.is_none()).map(|(column, _)| column).collect()
@@ -108,7 +105,6 @@ impl Table {
         self.data_row
     }
 
-    /// Columns of the table that are columns of the layout too, with their names.
     pub(crate) fn named_columns(&self) -> impl Iterator<Item = (usize, &str)> {
         self.sources.iter().copied().zip(self.layout.columns.iter().map(|column| column.name.as_str()))
     }

@@ -17,12 +17,10 @@ pub(crate) enum Cell<'a> {
 pub(crate) trait Cells {
     fn cell(&self, column: usize) -> Cell<'_>;
 
-    /// Decimal sign of numbers in texts.
     fn decimal(&self) -> u8 {
         b'.'
     }
 
-    /// The number in a cell; NaN without a number.
     fn number(&self, column: usize) -> f64 {
         match self.cell(column) {
             Cell::Number(value) if value.abs() < NO_READING => value,
@@ -48,13 +46,11 @@ pub(crate) trait Cells {
     }
 }
 
-/// Rows one after the other.
 pub(crate) trait Rows: Cells {
     /// Advances to the next row; `false` after the last one.
     fn advance(&mut self) -> Result<bool, LogError>;
 }
 
-/// The rows of a delimited file.
 pub(crate) struct RowStream {
     file: LogFile,
     rows: TextRows,

@@ -14,7 +14,6 @@ use std::ops::Range;
 struct EndBlock {
     title: String,
     rows: Range<usize>,
-    /// Number of rows with numbers.
     count: usize,
     is_comment: bool,
     /// Whether its rows are points of the surge line in the columns of the table.
@@ -25,9 +24,7 @@ pub(crate) struct EndBlocks(Vec<EndBlock>);
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum RowUse {
-    /// Point or title of a speed line.
     Line,
-    /// Point of the surge line.
     SurgeLine,
     /// None.
     Unused,
@@ -152,7 +149,6 @@ impl EndBlock {
         column.map(|column| self.numbers(grid, column)).unwrap_or_default()
     }
 
-    /// Whether a speed has several rows, as that of a speed line has.
     fn repeats_speeds(&self, grid: &Grid, layout: &Layout) -> bool {
         let mut speeds: Vec<f64> = self.speeds(grid, layout).into_iter().flatten().collect();
         speeds.sort_by(f64::total_cmp);

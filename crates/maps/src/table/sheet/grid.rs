@@ -11,20 +11,17 @@ use std::io::Cursor;
 pub(crate) struct GridRow {
     /// Line of the file or row of the sheet, from 1.
     pub(crate) at: usize,
-    /// Cells without blanks around them.
     pub(crate) cells: Vec<String>,
     /// Whether it is a comment (`#`, `%`, `!`, `//`).
     pub(crate) is_comment: bool,
 }
 
 impl GridRow {
-    /// All cells in one line.
     pub(crate) fn text(&self) -> String {
         self.cells.join(" ")
     }
 }
 
-/// Rows that are not blank.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Grid {
     pub(crate) rows: Vec<GridRow>,
@@ -59,7 +56,6 @@ impl Grid {
         Grid { rows, has_decimal_comma: false, is_blank_separated: false }
     }
 
-    /// Other rows with the same notation of numbers.
     pub(crate) fn with_rows(&self, rows: Vec<GridRow>) -> Grid {
         Grid { rows, is_blank_separated: false, ..*self }
     }

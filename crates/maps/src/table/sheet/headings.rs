@@ -14,7 +14,6 @@ pub(crate) struct Headings {
     pub(crate) names: Vec<String>,
     /// The names with the units of the row below.
     pub(crate) cells: Vec<String>,
-    /// Index of the first row below.
     pub(crate) first_row: usize,
 }
 
@@ -39,7 +38,6 @@ impl Headings {
         Headings { cells, names, first_row }
     }
 
-    /// A remark that names the columns outside `used`, if there are any.
     pub(crate) fn unused(&self, used: &[usize]) -> Option<ImportRemark> {
         let unused =
             self.cells.iter().enumerate().filter(|(index, cell)| !cell.is_empty() && !used.contains(index));
@@ -116,7 +114,6 @@ pub(crate) fn speed_in(grid: &Grid, text: &str) -> Option<f64> {
     Some(unit.map_or(value, |unit| unit.to_inside(value))).filter(|rpm| *rpm > 0.0)
 }
 
-/// A heading without the speed in it, and the speed in rpm.
 pub(crate) fn without_speed(grid: &Grid, heading: &str) -> Option<(String, f64)> {
     let is_number_char = |c: char| c.is_ascii_digit() || matches!(c, '.' | ',');
     let mut from = 0;

@@ -16,7 +16,6 @@ pub(crate) struct Group {
     pub(crate) columns: Vec<Column>,
     /// How many columns at the end it shares with the other groups.
     pub(crate) shared: usize,
-    /// Speed above the columns, rpm.
     pub(crate) speed_rpm: Option<f64>,
     /// Number of cells of every row if the table has no headings; else 0.
     pub(crate) bare_cells: usize,
@@ -66,13 +65,11 @@ impl Group {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Layout {
     pub(crate) groups: Vec<Group>,
-    /// Index of the first row below the headings.
     pub(crate) first_row: usize,
     pub(crate) remarks: Vec<ImportRemark>,
 }
 
 impl Layout {
-    /// The layout below headings, with a remark on those that no group uses.
     fn below(headings: &Headings, groups: Vec<Group>) -> Layout {
         let used: Vec<usize> =
             groups.iter().flat_map(|group| &group.columns).map(|column| column.index).collect();
@@ -122,7 +119,6 @@ pub(crate) fn detect_layout<'a>(
     Err(found.err().unwrap_or(ImportError::Empty))
 }
 
-/// The layout of a table; `None` if it has no rows of numbers.
 fn layout(grid: &Grid, described: &DescribedColumns) -> Result<Option<Layout>, ImportError> {
     if let Some(layout) = layout_by_column_numbers(grid, described)? {
         return Ok(Some(layout));

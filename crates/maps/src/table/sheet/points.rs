@@ -18,14 +18,11 @@ use std::ops::Range;
 /// Minimum median of efficiencies in per cent. Bound: fractions are at most 1, and usable points have at least 1 %.
 const MIN_PERCENTAGE: f64 = 1.5;
 
-/// The values of a point by column, as written.
 pub(crate) struct Point<'a> {
     /// Line of the file, from 1.
     pub(crate) at: usize,
     group: &'a layout::Group,
-    /// Speed of the block from its title, rpm.
     pub(crate) speed: Option<f64>,
-    /// Vane position from the title of the block.
     pub(crate) vane: Option<f64>,
     values: Vec<Option<f64>>,
     /// End of the speed line, if a cell of the row names it.
@@ -35,7 +32,6 @@ pub(crate) struct Point<'a> {
 }
 
 impl Point<'_> {
-    /// The column of a quantity, with the value as written.
     pub(crate) fn cell(&self, quantity: Quantity) -> Option<(&Column, f64)> {
         let position = self.group.columns.iter().position(|column| column.quantity == quantity)?;
         Some((self.group.columns.get(position)?, self.values.get(position).copied().flatten()?))
@@ -123,7 +119,7 @@ pub(crate) fn points<'a>(
                     }
                 }
             }
-            let end = end_of_line(row);
+            let end = row.cells.iter().find_map(|cell| end_in(cell));
             points.push(Point { at: row.at, group, speed, vane, values, end, is_of_surge_line });
         }
     }
@@ -168,10 +164,6 @@ fn values(
         return Err(ImportError::RowForm { line: row.at, text, form: ROW_FORM });
     }
     Ok(values)
-}
-
-fn end_of_line(row: &GridRow) -> Option<LineEnd> {
-    row.cells.iter().find_map(|cell| end_in(cell))
 }
 
 const ROW_FORM: &str = "a row of corrected rpm, corrected kg/s, pressure ratio and efficiency";
@@ -235,22 +227,18 @@ pub(crate) fn quantity_of_title(cell: &str) -> Option<Column> {
     found.filter(|found| MATRIX_QUANTITIES.contains(&found.quantity))
 }
 
-/// A matrix with the row and column of each value.
 struct Matrix {
     title: Column,
-    /// Row of the title.
     at: usize,
     rows: Range<usize>,
     /// The axis of the speed and the other one, as written.
     speeds: Vec<f64>,
     others: Vec<f64>,
-    /// Value by speed and other axis.
     cells: HashMap<[u64; 2], String>,
     speed_unit: String,
     flow_unit: String,
 }
 
-/// The table of points of a grid of matrices; `None` if it has none of pressure ratios.
 pub(crate) fn points_of_matrices(grid: &Grid) -> Option<Grid> {
     let mut matrices: Vec<Matrix> = Vec::new();
     for (index, row) in grid.rows.iter().enumerate() {
@@ -308,7 +296,6 @@ pub(crate) fn points_of_matrices(grid: &Grid) -> Option<Grid> {
     has_points.then(|| grid.with_rows(rows))
 }
 
-/// The matrix below a title in columns of a grid.
 fn matrix(grid: &Grid, index: usize, columns: Range<usize>, title: &Column) -> Option<Matrix> {
     let cell = |row: &GridRow, place: usize| row.cells.get(place).cloned().unwrap_or_default();
     let width = |row: &GridRow| row.cells.len().min(columns.end);

@@ -72,7 +72,6 @@ pub(crate) fn grid_of_workbook(bytes: &[u8], wanted: Option<&str>) -> Result<Gri
     Err(ImportError::Workbook { problem })
 }
 
-/// A sheet with its rows that are not blank.
 struct Sheet {
     name: String,
     is_hidden: bool,

@@ -164,7 +164,6 @@ fn place(layout: &Layout, column: usize) -> String {
     format!("{}field: {}", topic(layout, column), scalar(name))
 }
 
-/// The topic of a column, if the log has several groups.
 fn topic(layout: &Layout, column: usize) -> String {
     let group = layout.columns.get(column).and_then(|column| layout.groups.get(column.group));
     match group {
@@ -190,7 +189,6 @@ fn quoted(text: &str) -> String {
     json.chars().map(escaped).collect()
 }
 
-/// The text as a comment on one line.
 fn remark(text: &str) -> String {
     text.chars().map(|c| if is_plain(c) { c } else { ' ' }).collect()
 }

@@ -24,7 +24,6 @@ const NUMBERED: [Channel; 6] = [Channel::P2, Channel::T2, Channel::P3, Channel::
 
 #[derive(Clone, Copy, Default)]
 pub(super) struct Agreement {
-    /// Number of pairs of channels that agree.
     pub(super) agreeing: usize,
     pub(super) contradicting: usize,
     /// Whether the log may number its stations differently.
@@ -101,12 +100,10 @@ pub(super) fn check(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -
     agreement
 }
 
-/// Marks the numbered stations as unsure.
 pub(super) fn doubt_stations(proposal: &mut Proposal) {
     doubt(proposal, &NUMBERED, &Remark::OtherStations);
 }
 
-/// Marks channels whose stations were renumbered.
 pub(super) fn remark_stations(proposal: &mut Proposal, layout: &Layout) {
     for proposed in proposal.channels.iter_mut() {
         let name = layout.columns.get(proposed.column).map_or("", |column| column.name.as_str());
@@ -185,7 +182,6 @@ fn doubt(proposal: &mut Proposal, channels: &[Channel], remark: &Remark) {
     }
 }
 
-/// Readings of a channel, SI and absolute.
 struct Readings {
     t_s: Vec<f64>,
     values: Vec<f64>,

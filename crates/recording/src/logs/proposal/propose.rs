@@ -240,7 +240,6 @@ fn note_unknown_units(
     }
 }
 
-/// The units of flows at a standard temperature.
 fn standard_flows() -> Vec<String> {
     let standard = |unit: &&Unit| unit.symbol().contains('(') || unit.symbol().contains("m3/h");
     Kind::MassFlow.units().iter().filter(standard).map(|unit| unit.symbol().to_owned()).collect()

@@ -26,7 +26,6 @@ const KINDS: [(Kind, Measured); 5] = [
     (Kind::Fraction, Measured::Opening),
 ];
 
-/// Channels of a name with their weights; `kind` is that of its unit.
 fn channels_of_name(name: &ColumnName, kind: Option<Kind>) -> Vec<(Channel, Weight)> {
     let has_unit = |of: Kind| kind.is_none_or(|kind| kind == of);
     if name.has(Word::Dew) {
@@ -159,7 +158,6 @@ pub(crate) fn propose_stations(
     }
 }
 
-/// Loops with one temperature and one pressure.
 fn stations(taken: &[bool], layout: &Layout, survey: &Survey, units: &[Option<HeaderUnit>]) -> Vec<Station> {
     let tags: Vec<(usize, Measured, u32)> = (0..layout.columns.len())
         .filter(|column| !taken[*column])

@@ -32,7 +32,6 @@ impl Case {
     }
 }
 
-/// A point of table 1 on the noisy rig, by both ways of mapping.
 struct Mapped {
     to_rpm: f64,
     /// Apparent minus true efficiency when the point has settled at 500 degC, points.
@@ -54,7 +53,6 @@ fn steady_error_points(steady: &SteadyState, errors: &[(f64, f64)]) -> f64 {
     100.0 * (apparent_efficiency(pressure_ratio, t1_k, t2_k, Air::PAPER) - steady.outputs.efficiency)
 }
 
-/// Table 1 on the paper's machine and rig, once for each seed.
 fn mapped() -> Result<Vec<Mapped>, ReproduceError> {
     let (machine, config) = (paper_machine(), config());
     let mut cases = Vec::new();

@@ -296,7 +296,6 @@ fn picture(all_outcomes: &[Outcome]) -> String {
 /// Order of the speeds in one round of jumps: table 1 jumps between the slowest and the third, the second and the fastest.
 const JUMP_ORDER: [usize; 4] = [0, 2, 1, 3];
 
-/// Differences of the housing temperature between successive settled points, K.
 fn gradients_k(visits: &[SteadyState]) -> Vec<f64> {
     visits.windows(2).map(|pair| (pair[1].state.tc_k - pair[0].state.tc_k).abs()).collect()
 }

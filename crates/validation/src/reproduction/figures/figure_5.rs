@@ -64,7 +64,6 @@ fn below_adiabatic() -> Result<Statement, ReproduceError> {
     Ok(Statement::new(paper, format!("{}.", texts.join("; ")), Verdict::of(signs[0], signs[1])))
 }
 
-/// Section 2.1: where the heat of the turbine housing goes.
 fn heat_of_the_turbine() -> Result<Statement, ReproduceError> {
     let mut shares = Vec::new();
     for model in [Model::nominal(), paper_machine()] {

@@ -60,7 +60,6 @@ fn own_inlet() -> Result<OwnInlet, ReproduceError> {
     })
 }
 
-/// Statements of the paper on figure 8 (b), for both machines.
 fn statements_on_h(
     right: &[Outcome],
     wrong: &[Outcome],

@@ -18,6 +18,7 @@ use mapper_numerics::statistics::HINT_SIGMAS;
 use mapper_physics::rig::effect::Effect;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Some library terms, by index, with their fit to the recording.
@@ -294,6 +295,8 @@ pub(crate) struct TermSearch {
     /// The recording, with the library effects followed by the closure terms.
     pub(crate) study: Study,
     pub(crate) library: Vec<Term>,
+    /// The closure terms among the effects of the study.
+    pub(crate) closures: BTreeMap<usize, Choice>,
 }
 
 impl TermSearch {
@@ -327,7 +330,11 @@ impl TermSearch {
                 (steps * p.typical_step).clamp(START_RANGE_SHARE * p.low, START_RANGE_SHARE * p.high)
             })
             .collect();
-        let effect = self.study.add(Arc::new(closure));
+        let known =
+            self.closures.iter().find(|(_, known)| known.key == choice.key).map(|(effect, _)| *effect);
+        let effect = known.unwrap_or_else(|| self.study.add(Arc::new(closure)));
+        self.study.rarities.insert(effect, choice.rarity);
+        self.closures.insert(effect, choice.clone());
         let mut start = base.clone();
         start.effects.push((effect, values));
         (choice.clone(), effect, Start::from(&start))

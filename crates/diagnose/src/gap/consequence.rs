@@ -184,7 +184,7 @@ impl Diagnosed {
     fn imitation(&self) -> Option<(f64, &CauseFit)> {
         let Diagnosed { diagnosis, fits, .. } = self;
         let term = diagnosis.closure_terms.first().filter(|_| diagnosis.is_outside_without_closure())?;
-        Some((diagnosis.probability_outside * term.gap_reduction, &fits.closures.first()?.fit))
+        Some((diagnosis.probability_outside * term.gap_reduction, fits.closures.first()?))
     }
 
     /// What uncorrected causes add to a point: weighted squared changes by their corrections, and T2's residual without a closure term.
@@ -216,7 +216,7 @@ impl Diagnosed {
             let sentences = std::iter::once(&term.sentence).chain(&term.equivalent);
             return OpenCauses {
                 causes: sentences.map(|sentence| Candidate::of_closure(term, sentence)).collect(),
-                fits: fits.closures.iter().map(|closure| &closure.fit).collect(),
+                fits: fits.closures.iter().collect(),
                 probability: term.probability,
                 gap_reduction: term.gap_reduction,
             };

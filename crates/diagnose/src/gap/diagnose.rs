@@ -1,10 +1,11 @@
 //! The diagnosis of one recording, stage by stage; `docs/explanation/gap.md` explains each.
 
-use crate::closure::discover::{Discovered, discover};
+use crate::closure::discover::{Discovered, Proposed, discover};
+use crate::closure::select::ClosureKey;
 use crate::drift::DriftReport;
 use crate::gap::baseline::Baseline;
 use crate::gap::best_fit::fit::Fit;
-use crate::gap::best_fit::fitted_causes::{CauseFit, ClosureFit, Fits, map_effect};
+use crate::gap::best_fit::fitted_causes::{CauseFit, Fits, map_effect};
 use crate::gap::calibrated_model::Found;
 use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::{Posterior, rivals, smallest_seen, suspicions, weight};
@@ -67,7 +68,7 @@ impl Diagnosed {
             Ok((prediction, residual))
         };
         let settled = diagnosis.probable_closure_term().and(fits.closures.first());
-        let closure = settled.map(|closure| ("the closure term", &closure.fit));
+        let closure = settled.map(|closure| ("the closure term", closure));
         let first = fits.causes.first().map(|cause| ("the most probable cause", cause));
         let with = closure.or(first).filter(|_| diagnosis.verdict != Verdict::WithinTolerance);
         let named = with.filter(|_| closure.is_some() || diagnosis.verdict != Verdict::Unexplained);
@@ -111,11 +112,20 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     let gap = gap_on_held_out_steps(&library, &posterior, &calibration);
     let explained = explained(&library, &posterior, &gap);
     let verdict = verdict(explained, posterior.probabilities.unmodelled, prepared.drift.as_ref());
-    let closure = closure_terms(&library, explained, request.closure_search, &calibration, &beyond);
+    let mut closure = closure_terms(&library, explained, request.closure_search, &calibration, &beyond);
     // A change with time cannot be expressed as a closure term.
-    let closure = if prepared.drift.is_some() { closure.without_terms() } else { closure };
+    if prepared.drift.is_some() {
+        closure.proposed = None;
+    }
+    let is_open = matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained);
+    let settled = closure.proposed.as_ref().filter(|found| is_open && found.closure_term.probability > 0.5);
+    let verdict = match settled {
+        Some(found) if found.closure_term.beside.is_empty() => Verdict::Unexplained,
+        Some(_) => Verdict::PartlyExplained,
+        None => verdict,
+    };
     let is_outside_tolerance = verdict != Verdict::WithinTolerance;
-    let has_closure = closure.is_settled();
+    let has_closure = settled.is_some();
     let locations = match closure.places {
         _ if !is_outside_tolerance => Vec::new(),
         Some(places) => places,
@@ -136,7 +146,7 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         locations,
         suspects: beyond_prior(&library.study, library.at_best(), named.unwrap_or(&library.null)),
         inseparable: inseparable(&library, &posterior),
-        closure_terms: closure.closure_terms,
+        closure_terms: closure.proposed.iter().map(|proposed| proposed.closure_term.clone()).collect(),
         closure_terms_by_balance: if is_outside_tolerance { closure.residual_sources } else { Vec::new() },
         gap,
         map_effect: None,
@@ -147,26 +157,37 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         offsets_at_rest: prepared.zeroed.offsets_at_rest,
         assumed: if rig.tolerances_declared { Vec::new() } else { assumed(&library.study) },
         warnings: all_warnings(&prepared.drift, warnings, request.warnings, prepared.rejected_drift),
-        candidates: posterior.candidates,
-        probability_none: posterior.probabilities.none,
-        probability_unlisted: posterior.probabilities.unlisted,
-        probability_outside: posterior.probabilities.unmodelled,
+        candidates: match settled {
+            Some(proposed) => proposed.causes.iter().map(|(candidate, ..)| candidate.clone()).collect(),
+            None => posterior.candidates,
+        },
+        probability_none: settled.map_or(posterior.probabilities.none, |proposed| proposed.none),
+        probability_unlisted: if has_closure { 0.0 } else { posterior.probabilities.unlisted },
+        probability_outside: settled.map_or(posterior.probabilities.unmodelled, Proposed::outside),
     };
-    let best = library.fits.first().filter(|_| verdict.names_a_cause()).unwrap_or(&library.null);
-    let found = Found::of(&library.study, best, diagnosis.doubt());
+    let in_library = library.fits.first().filter(|_| verdict.names_a_cause());
+    let best = settled.and_then(|proposed| Some(&proposed.causes.first()?.1)).or(in_library);
+    let found = Found::of(&library.study, best.unwrap_or(&library.null), diagnosis.doubt());
     let mut study = library.study.clone();
-    let closures = closure.fits.into_iter().filter_map(|(key, effect, fit)| {
-        let mut fit = CauseFit::of(&fit);
-        let own = fit.hypothesis.effects.iter_mut().find(|(index, _)| *index == effect)?;
-        own.0 = key.add_to(&mut study)?;
-        Some(ClosureFit { key, fit })
-    });
-    let causes = posterior.probabilities.causes.iter().map(|cause| CauseFit::of(&library.fits[cause.set]));
-    let fits =
-        Fits { null: CauseFit::of(&library.null), causes: causes.collect(), closures: closures.collect() };
+    let mut fit_of = |fit: &Fit, key: &Option<ClosureKey>| match key {
+        Some(key) => CauseFit::with_closure(fit, key, &mut study),
+        None => Some(CauseFit::of(fit)),
+    };
+    let closures = closure.proposed.iter().flat_map(|proposed| &proposed.causes[..proposed.alike]);
+    let closures = closures.filter(|(candidate, ..)| candidate.has_closure());
+    let closures = closures.filter_map(|(_, fit, key)| fit_of(fit, key)).collect();
+    let causes = match settled {
+        Some(proposed) => proposed.causes.iter().filter_map(|(_, fit, key)| fit_of(fit, key)).collect(),
+        None => posterior
+            .probabilities
+            .causes
+            .iter()
+            .map(|cause| CauseFit::of(&library.fits[cause.set]))
+            .collect(),
+    };
+    let fits = Fits { null: CauseFit::of(&library.null), causes, closures };
     let settled = diagnosis.probable_closure_term().and(fits.closures.first());
-    let cause =
-        settled.map(|closure| &closure.fit).or(fits.causes.first().filter(|_| verdict.names_a_cause()));
+    let cause = settled.or(fits.causes.first().filter(|_| verdict.names_a_cause()));
     let Zeroed { recording, zero, .. } = prepared.zeroed;
     let map_effect = cause.and_then(|cause| map_effect(&study, cause, &recording, &rig.identification));
     let diagnosis = Diagnosis { map_effect, ..diagnosis };
@@ -240,7 +261,7 @@ fn closure_terms(
         ClosureSearch::IfUnexplained => matches!(explained, Explained::Most | Explained::Little),
         ClosureSearch::Never => false,
     };
-    if is_wanted { discover(library, explained, calibration, progress) } else { Discovered::default() }
+    if is_wanted { discover(library, calibration, progress) } else { Discovered::default() }
 }
 
 /// What the choice of the next experiment depends on.

@@ -103,6 +103,13 @@ impl LibraryFits {
         self.fits.first().unwrap_or(&self.null)
     }
 
+    /// The causes beside which a closure term is tried: the best one, and the best single effect, because several imitate what is outside.
+    pub(crate) fn bases(&self) -> impl Iterator<Item = &Fit> {
+        let single = |fit: &&Fit| fit.hypothesis.effects.len() == 1;
+        let best = self.fits.first().filter(|best| !single(best));
+        best.into_iter().chain(self.fits.iter().chain(&self.searched).find(single))
+    }
+
     pub(crate) fn at_best(&self) -> &Linearised {
         self.at_best.as_ref().unwrap_or(&self.linearised)
     }

@@ -50,7 +50,7 @@ pub struct Diagnosis {
     pub probability_none: f64,
     /// Probability of causes of the effect library that are not among the candidates.
     pub probability_unlisted: f64,
-    /// Probability that the cause is not in the effect library.
+    /// Probability of a cause outside the effect library, alone or with effects of it; candidates with a closure term are included.
     pub probability_outside: f64,
     /// Closure terms for the gap that the effect library does not explain, best first; empty if none is proposed.
     pub closure_terms: Vec<ClosureTerm>,
@@ -215,6 +215,9 @@ pub struct Candidate {
     pub names: Vec<String>,
     /// Calibrated probability of these effects, with or without others too weak to detect.
     pub probability: f64,
+    /// Probability of each effect, whatever the others.
+    #[serde(default)]
+    pub each: Vec<f64>,
     /// Parameters; `inner_node.phi` if an effect has several.
     pub parameters: BTreeMap<String, Estimate>,
     /// Onsets of effects that begin with a step, by id.
@@ -229,10 +232,36 @@ impl Candidate {
 
     /// A closure term as a cause, with the effects fitted beside it.
     pub(crate) fn of_closure(term: &ClosureTerm, sentence: &str) -> Candidate {
-        let mut cause = term.beside_cause.clone().unwrap_or_default();
-        cause.effects.push(Candidate::CLOSURE.to_owned());
-        cause.names.push(sentence.to_owned());
-        Candidate { probability: term.probability, ..cause }
+        let cause = term.beside_cause.clone().unwrap_or_default();
+        Candidate { probability: term.probability, ..cause.with_closure(sentence, term.probability) }
+    }
+
+    /// The same with a closure term as one more member.
+    pub(crate) fn with_closure(mut self, sentence: &str, probability: f64) -> Candidate {
+        self.effects.push(Candidate::CLOSURE.to_owned());
+        self.names.push(sentence.to_owned());
+        self.each.push(probability);
+        self
+    }
+
+    /// The cause without its closure term, which is the last member.
+    pub(crate) fn without_closure(mut self) -> Candidate {
+        if self.has_closure() {
+            self.effects.pop();
+            self.names.pop();
+            self.each.pop();
+        }
+        self
+    }
+
+    /// Whether a closure term is a member.
+    pub fn has_closure(&self) -> bool {
+        self.effects.last().is_some_and(|effect| effect == Candidate::CLOSURE)
+    }
+
+    /// The sentence of its closure term.
+    pub(crate) fn closure(&self) -> Option<&String> {
+        self.names.last().filter(|_| self.has_closure())
     }
 }
 
@@ -491,12 +520,15 @@ pub(crate) const MAX_REFITTED: usize = 7;
 pub(crate) const MAX_EQUIVALENT: usize = 2;
 
 impl Diagnosis {
-    /// Causes to list: the first, and others that are not improbable.
+    /// Causes to list: the first if it is named, and others that are not improbable.
     pub fn listed(&self) -> impl Iterator<Item = &Candidate> {
         self.candidates
             .iter()
             .enumerate()
-            .filter(|(place, c)| *place == 0 || self.lists_all || c.probability >= LISTED)
+            .filter(|(place, c)| {
+                let is_named = *place == 0 && self.verdict.names_a_cause();
+                is_named || self.lists_all || c.probability >= LISTED
+            })
             .map(|(_, c)| c)
     }
 

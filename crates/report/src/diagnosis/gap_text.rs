@@ -95,13 +95,15 @@ fn causes(diagnosis: &Diagnosis) -> Document {
     });
     let listed: f64 = diagnosis.listed().map(|candidate| candidate.probability).sum();
     let all: f64 = diagnosis.candidates.iter().map(|candidate| candidate.probability).sum();
+    let with_closure = diagnosis.candidates.iter().filter(|candidate| candidate.has_closure());
+    let unmodelled = diagnosis.probability_outside - with_closure.map(|one| one.probability).sum::<f64>();
     let improbable = Some((all - listed, IMPROBABLE.to_owned())).filter(|(sum, _)| *sum > SHOWN);
     let mut rows: Vec<(f64, String)> = candidate_rows
         .chain(improbable)
         .chain([
             (diagnosis.probability_none, NOTHING.to_owned()),
             (diagnosis.probability_unlisted, UNLISTED.to_owned()),
-            (diagnosis.probability_outside, OUTSIDE.to_owned()),
+            (unmodelled.max(0.0), OUTSIDE.to_owned()),
         ])
         .collect();
     rows.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -315,9 +317,11 @@ fn answer(diagnosis: &Diagnosis) -> String {
                 probability_text(diagnosis.probability_outside)
             );
             let Some(term) = diagnosis.probable_closure_term() else { return outside };
-            let beside =
-                term.beside_cause.as_ref().map(|beside| format!(", together with {}", cause(beside)));
-            format!("{outside}: {}{}", term.sentence, beside.unwrap_or_default())
+            let closure = format!("{} (closure term, {})", term.sentence, probability_text(term.probability));
+            match &term.beside_cause {
+                Some(beside) => format!("{} and {closure} explain the gap{suffix} together", members(beside)),
+                None => format!("{outside}: {closure}"),
+            }
         }
     }
 }
@@ -388,6 +392,23 @@ fn nearest(diagnosis: &Diagnosis) -> Option<String> {
         Verdict::Unexplained => Some("no effect of the library comes near".to_owned()),
         Verdict::WithinTolerance | Verdict::Explained => None,
     }
+}
+
+/// Each effect with its sizes and its own probability.
+fn members(candidate: &Candidate) -> String {
+    let member = |((id, name), probability): ((&String, &String), &f64)| {
+        let own = candidate.parameters.iter().filter(|(key, _)| key.split('.').next() == Some(id));
+        let sizes: Vec<&str> = own.map(|(_, estimate)| estimate.size.as_str()).collect();
+        format!("{name} ({id}) {} ({})", sizes.join(", "), probability_text(*probability))
+    };
+    candidate
+        .effects
+        .iter()
+        .zip(&candidate.names)
+        .zip(&candidate.each)
+        .map(member)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// Effects by their names, with ids and onset times.

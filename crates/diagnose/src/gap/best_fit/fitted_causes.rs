@@ -21,19 +21,22 @@ pub(crate) struct CauseFit {
     pub(crate) hypothesis: Hypothesis,
     /// Covariance of the effects' search coordinates; `None` if the recording does not determine them.
     pub(crate) covariance: Option<DMatrix<f64>>,
+    /// The closure term that is its last effect, if any.
+    pub(crate) closure: Option<ClosureKey>,
 }
 
 impl CauseFit {
     pub(crate) fn of(fit: &Fit) -> CauseFit {
         let covariance = Some(&fit.covariance).filter(|all| all.iter().all(|one| one.is_finite()));
-        CauseFit { hypothesis: fit.hypothesis.clone(), covariance: covariance.cloned() }
+        CauseFit { hypothesis: fit.hypothesis.clone(), covariance: covariance.cloned(), closure: None }
     }
-}
 
-#[derive(Debug, Clone)]
-pub(crate) struct ClosureFit {
-    pub(crate) key: ClosureKey,
-    pub(crate) fit: CauseFit,
+    /// The same of a fit whose last effect is a closure term, which `study` gets; `None` if `study` has other steps.
+    pub(crate) fn with_closure(fit: &Fit, key: &ClosureKey, study: &mut Study) -> Option<CauseFit> {
+        let mut fit = CauseFit { closure: Some(key.clone()), ..CauseFit::of(fit) };
+        fit.hypothesis.effects.last_mut()?.0 = key.add_to(study)?;
+        Some(fit)
+    }
 }
 
 /// The fits on which everything rests that follows from a diagnosis.
@@ -42,7 +45,7 @@ pub(crate) struct Fits {
     pub(crate) null: CauseFit,
     pub(crate) causes: Vec<CauseFit>,
     /// Those of the first closure term, and of those that the recording does not distinguish from it.
-    pub(crate) closures: Vec<ClosureFit>,
+    pub(crate) closures: Vec<CauseFit>,
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -66,7 +66,9 @@ pub(crate) fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>], rarity: f64) -
             }
         });
         // Scores of fits to some steps and to all steps are not comparable; gains are.
-        Explanation { score: 0.5 * candidate.gain - rarity * all.len() as f64, parts: parts.collect() }
+        let chosen: f64 = all.iter().filter_map(|effect| study.rarities.get(effect)).sum();
+        let score = 0.5 * candidate.gain - chosen - rarity * all.len() as f64;
+        Explanation { score, parts: parts.collect() }
     };
     fits.iter().map(explanation).collect()
 }

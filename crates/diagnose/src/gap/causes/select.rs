@@ -27,7 +27,7 @@ pub(crate) struct Search<'a> {
 }
 
 /// Limits of the search. Bound: effort. The slack is the evidence that a cause must have over no cause.
-const LIMITS: Limits = Limits { members: MAX_MEMBERS, starts: 2, fits: 6, slack: 3.0 };
+pub(crate) const LIMITS: Limits = Limits { members: MAX_MEMBERS, starts: 2, fits: 6, slack: 3.0 };
 /// Decrease of the cost by a single effect above which nuisances are linearised again at its fit: their derivatives differ there from those at the
 /// nominal point. Bound: an effect of fewer than five sigmas bends them by less than their errors.
 const RELINEARISING_DECREASE: f64 = 30.0;

@@ -3,18 +3,15 @@
 use crate::closure::columns::{Base, Products};
 use crate::closure::library as term_library;
 use crate::closure::select::{Choice, FittedClosure, TermSearch, begun, choices, keep_determined, promising};
-use crate::closure::term::Term;
 use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, adequacy};
 use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::additions::Calibration;
-use crate::gap::causes::place::LINEARISATION_ERROR_RATIO;
 use crate::gap::causes::select::{LIMITS, Search, supported};
-use crate::gap::gap_reduction::FOLDS;
 use crate::gap::library_fits::LibraryFits;
 use crate::gap::report::MAX_EQUIVALENT;
 use crate::gap::residuals::study::members;
 use crate::gap::residuals::whiten::Linearised;
-use mapper_inference::search::{Known, climb};
+use mapper_inference::search::{Causes, Known, climb};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Effort of the fits that are compared. Bound: the decrease is a tenth of what one more sigma of evidence costs.
@@ -34,8 +31,6 @@ pub(crate) struct Combined<'a> {
     everywhere: Selection,
     /// Fits to all steps, of sets with a closure term and of their subsets.
     known: Known<Fit>,
-    /// Share of the folds of steps in which each closure term recurs, by its effect.
-    pub(crate) stability: BTreeMap<usize, f64>,
 }
 
 impl<'a> Combined<'a> {
@@ -52,8 +47,7 @@ impl<'a> Combined<'a> {
             library: term_library::library(),
             closures: BTreeMap::new(),
         };
-        let (known, stability) = (Known::default(), BTreeMap::new());
-        Combined { library, calibration, terms, training, everywhere, known, stability }
+        Combined { library, calibration, terms, training, everywhere, known: Known::default() }
     }
 
     /// Searches from no cause; if that leaves a gap also from library causes, and last for terms that begin during the recording.
@@ -134,39 +128,19 @@ impl<'a> Combined<'a> {
         let changes = base.changes(library);
         let usable: Vec<usize> = (0..changes.len()).filter(|place| changes[*place].is_some()).collect();
         let columns: Vec<Vec<f64>> = changes.into_iter().flatten().collect();
-        let products = Products::new(base, &columns);
-        let of = |counts: &[bool]| Some(choices(library, &usable, &products.projected(counts)?));
         let training = &self.training.steps;
-        let Some(on_training) = of(training) else { return };
-        let fold = |fold| {
-            let steps = training.iter().enumerate();
-            steps.map(|(step, counts)| *counts && step % FOLDS != fold).collect()
+        let Some(products) = Products::new(base, &columns).projected(training) else { return };
+        let choices = choices(library, &usable, &products);
+        let chosen = if late {
+            begun(base, library, &choices, training).unwrap_or_default()
+        } else {
+            promising(library, &choices)
         };
-        let folds: Vec<Vec<bool>> = (0..FOLDS).map(fold).collect();
-        if late {
-            if let Some((later, stability)) = begun(base, library, &on_training, training, &folds) {
-                self.fit(base, &later, &|_| stability);
-            }
-            return;
-        }
-        let in_folds: Vec<Vec<Choice>> = folds.iter().filter_map(|counts| of(counts)).collect();
-        let chosen = promising(library, &on_training);
-        let parts: Vec<_> = library.iter().map(Term::submodel).collect();
-        let part = |choice: &Choice| parts[choice.terms[0]];
-        let stability = |closure: &Choice| {
-            let again = in_folds.iter().filter(|fold| {
-                let Some(first) = fold.first() else { return false };
-                let own = fold.iter().find(|choice| choice.terms == closure.terms);
-                part(first) == part(closure)
-                    && own.is_some_and(|own| own.gain > (1.0 - LINEARISATION_ERROR_RATIO) * first.gain)
-            });
-            again.count() as f64 / FOLDS as f64
-        };
-        self.fit(base, &chosen, &stability);
+        self.fit(base, &chosen);
     }
 
     /// Fits choices with model runs: to the training steps, and the best of them to all steps.
-    fn fit(&mut self, base: &Base<'_>, chosen: &[Choice], stability: &dyn Fn(&Choice) -> f64) {
+    fn fit(&mut self, base: &Base<'_>, chosen: &[Choice]) {
         let terms = &mut self.terms;
         let starts: Vec<_> = chosen.iter().map(|choice| terms.start(&base.hypothesis, choice)).collect();
         let mut trained = terms.fit(starts.into_iter(), base.linearised, &self.training, QUICK);
@@ -180,10 +154,7 @@ impl<'a> Combined<'a> {
         let mut fitted = terms.fit(restarts, linearised, &self.everywhere, EFFORT);
         keep_determined(&terms.library, &mut fitted);
         let mut known = std::mem::take(&mut self.known);
-        for closure in fitted {
-            self.stability.insert(closure.effect, stability(&closure.choice));
-            known.keep(&self.at(linearised), closure.fit);
-        }
+        fitted.into_iter().for_each(|closure| known.keep(&self.at(linearised), closure.fit));
         self.known = known;
     }
 
@@ -210,7 +181,10 @@ impl<'a> Combined<'a> {
             last.effects.sort_by_key(|(index, _)| *index == effect);
             Some((choice.clone(), effect, (&last).into()))
         };
-        self.terms.fit(kept.iter().filter_map(restart), linearised, &self.everywhere, EFFORT)
+        let mut sets = self.terms.fit(kept.iter().filter_map(restart), linearised, &self.everywhere, EFFORT);
+        let ln_odds = |set: &FittedClosure| self.at(linearised).ln_odds(&set.fit);
+        sets.sort_by(|a, b| ln_odds(b).total_cmp(&ln_odds(a)));
+        sets
     }
 
     /// The fit of a set to the training steps alone.

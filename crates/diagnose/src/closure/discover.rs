@@ -9,9 +9,7 @@ use crate::closure::term::{Balance, Properties};
 use crate::gap::best_fit::fit::{Effort, Fit, adequacy, fit, misfit_of_steps, with_start_read};
 use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::additions::Calibration;
-use crate::gap::causes::place::{
-    Explanation, Gain, LINEARISATION_ERROR_RATIO, Part, of_fits, places_of, rarity,
-};
+use crate::gap::causes::place::{Explanation, Gain, LINEARISATION_ERROR_RATIO, Part, of_fits, places_of};
 use crate::gap::causes::probabilities::{candidate_of, cause_set, weight};
 use crate::gap::causes::select::MIN_GAP_REDUCTION;
 use crate::gap::gap_reduction::channels_on;
@@ -36,14 +34,14 @@ pub(crate) struct Discovered {
 #[derive(Debug)]
 pub(crate) struct Proposed {
     pub(crate) closure_term: ClosureTerm,
+    /// The recording with the closure terms of the causes.
+    pub(crate) study: Study,
     /// Probability of no cause.
     pub(crate) none: f64,
     /// Probability of a cause that nobody modelled.
     pub(crate) unmodelled: f64,
     /// Most probable first; a closure term is the last effect of its fit.
     pub(crate) causes: Vec<(Candidate, Fit, Option<ClosureKey>)>,
-    /// Number of the first causes that the data do not distinguish.
-    pub(crate) alike: usize,
 }
 
 impl Proposed {
@@ -128,14 +126,9 @@ fn propose(
     let read = |fit: Fit| if training.steps[0] { fit } else { with_start_read(study, linearised, fit) };
     let (before, after) = (read(before), read(combined.trained(best)?));
     let gap_reduction = gap_reduction(study, &before, &after, held_out);
-    let stability = combined.stability.get(&best.effect).copied().unwrap_or(0.0);
-    // It must recur in half of the folds.
-    if gap_reduction < MIN_GAP_REDUCTION || stability < 0.5 {
-        return None;
-    }
     let (channels, worse) = channels_on(study, linearised, [&before, &after], held_out);
     // A closure term that makes a channel worse on steps that it has not seen closes nothing.
-    if !worse.is_empty() {
+    if gap_reduction < MIN_GAP_REDUCTION || !worse.is_empty() {
         return None;
     }
     let describe =
@@ -160,8 +153,8 @@ fn propose(
     let alike = probabilities.alike.min(1 + MAX_EQUIVALENT);
     let ClosureDescription { sentence, terms: coefficients, .. } = description;
     let others = found[..alike].iter().filter_map(|(cause, ..)| cause.closure().cloned());
-    let beside = found.first().map(|(cause, ..)| cause.clone().without_closure());
-    let beside = beside.filter(|cause| !cause.effects.is_empty());
+    let beside = found.first().map_or(&[][..], |(cause, ..)| &cause.effects);
+    let beside = beside.iter().filter(|id| *id != Candidate::CLOSURE).cloned().collect();
     let closure_term = ClosureTerm {
         submodel: terms.library[best.choice.terms[0]].submodel().name().to_owned(),
         equivalent: others.filter(|other| *other != sentence).collect(),
@@ -171,15 +164,12 @@ fn propose(
         gap_reduction,
         held_out_steps: held_out.len(),
         channels,
-        worse,
-        beside: beside.as_ref().map(|cause| cause.effects.clone()).unwrap_or_default(),
-        beside_cause: beside,
-        stability,
+        beside,
         rhai: None,
         script,
     };
     let CauseProbabilities { none, unmodelled, .. } = probabilities;
-    Some(Proposed { closure_term, none, unmodelled, causes: found, alike })
+    Some(Proposed { closure_term, study: study.clone(), none, unmodelled, causes: found })
 }
 
 /// Locations from all explanations tried: effects, closure terms, source terms.
@@ -194,7 +184,7 @@ fn places(
     let all = combined.all();
     let gains = sets.iter().map(|set| &set.fit).chain(fits).chain(&all);
     let gains: Vec<Gain<'_>> = gains.map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
-    let mut explanations = of_fits(&combined.terms.study, &gains, rarity(calibration, study));
+    let mut explanations = of_fits(&combined.terms.study, &gains, calibration);
     // The other fits give each member's contribution.
     explanations.truncate(sets.len() + fits.len());
     // Linear gains are relative to the linear cost of the null hypothesis.

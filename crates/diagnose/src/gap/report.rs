@@ -156,20 +156,14 @@ pub struct ClosureTerm {
     pub terms: Vec<ClosureCoefficient>,
     /// Probability of this term among all terms tried and none.
     pub probability: f64,
-    /// Share of the gap removed on steps used neither to find nor to fit the term; 0 if any channel gets worse.
+    /// Share of the gap removed on steps used neither to find nor to fit the term; no channel gets worse there.
     pub gap_reduction: f64,
     /// Number of these held-out steps.
     pub held_out_steps: usize,
     /// Gap of each channel on these steps.
     pub channels: BTreeMap<String, ChannelGap>,
-    /// Channels that get worse on these steps.
-    pub worse: Vec<String>,
     /// Library effects fitted together with the term; empty if it was found alone.
     pub beside: Vec<String>,
-    /// These effects with their sizes.
-    pub beside_cause: Option<Candidate>,
-    /// Share of the leave-one-out folds of steps that select the same part and this term or an equivalent.
-    pub stability: f64,
     /// Closure terms that the recording cannot distinguish from this one, as sentences.
     pub equivalent: Vec<String>,
     /// Name of the effect file written for it.
@@ -230,27 +224,11 @@ impl Candidate {
     /// Id of a closure term among the effects of a cause.
     pub const CLOSURE: &str = "closure_term";
 
-    /// A closure term as a cause, with the effects fitted beside it.
-    pub(crate) fn of_closure(term: &ClosureTerm, sentence: &str) -> Candidate {
-        let cause = term.beside_cause.clone().unwrap_or_default();
-        Candidate { probability: term.probability, ..cause.with_closure(sentence, term.probability) }
-    }
-
     /// The same with a closure term as one more member.
     pub(crate) fn with_closure(mut self, sentence: &str, probability: f64) -> Candidate {
         self.effects.push(Candidate::CLOSURE.to_owned());
         self.names.push(sentence.to_owned());
         self.each.push(probability);
-        self
-    }
-
-    /// The cause without its closure term, which is the last member.
-    pub(crate) fn without_closure(mut self) -> Candidate {
-        if self.has_closure() {
-            self.effects.pop();
-            self.names.pop();
-            self.each.pop();
-        }
         self
     }
 

@@ -23,7 +23,7 @@ pub struct StoredFits {
     null: StoredFit,
     /// All candidates, also those that are not listed.
     causes: Vec<(Candidate, StoredFit)>,
-    closures: Vec<StoredFit>,
+    closure: Option<StoredFit>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -69,12 +69,12 @@ pub enum RestoreError {
 impl Diagnosed {
     /// The fits for a file.
     pub fn stored(&self) -> StoredFits {
-        let Fits { null, causes, closures } = &self.fits;
+        let Fits { null, causes, closure } = &self.fits;
         let stored = |fit: &CauseFit| self.stored_fit(fit);
         StoredFits {
             null: stored(null),
             causes: self.diagnosis.candidates.iter().cloned().zip(causes.iter().map(stored)).collect(),
-            closures: closures.iter().map(stored).collect(),
+            closure: closure.as_ref().map(stored),
         }
     }
 
@@ -109,7 +109,7 @@ impl Diagnosed {
     ) -> Result<Diagnosed, RestoreError> {
         let zeroed = Zeroed::new(rig, drift.as_ref());
         let mut study = zeroed.study(rig, effects)?;
-        let all = || stored.causes.iter().map(|(_, fit)| fit).chain(&stored.closures);
+        let all = || stored.causes.iter().map(|(_, fit)| fit).chain(&stored.closure);
         let is_late = |one: &StoredEffect| matches!(one.cause, StoredCause::Effect { begins: Some(_), .. });
         if all().any(|fit| fit.effects.iter().any(is_late)) {
             study.add_onsets();
@@ -117,7 +117,7 @@ impl Diagnosed {
         let mut fit = |stored: &StoredFit| stored.restored(&mut study);
         let null = fit(&stored.null)?;
         let causes = stored.causes.iter().map(|(_, stored)| fit(stored)).collect::<Result<_, _>>()?;
-        let closures = stored.closures.iter().map(fit).collect::<Result<_, _>>()?;
+        let closure = stored.closure.as_ref().map(fit).transpose()?;
         let candidates = stored.causes.into_iter().map(|(candidate, _)| candidate).collect();
         Ok(Diagnosed {
             diagnosis: Diagnosis { candidates, ..diagnosis },
@@ -125,7 +125,7 @@ impl Diagnosed {
             zero: zeroed.zero,
             found,
             study,
-            fits: Fits { null, causes, closures },
+            fits: Fits { null, causes, closure },
             library: None,
         })
     }

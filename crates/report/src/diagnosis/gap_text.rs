@@ -249,10 +249,7 @@ fn add_closure_terms(document: &mut Document, diagnosis: &Diagnosis) {
 }
 
 fn describe_removed_residual(term: &ClosureTerm) -> String {
-    match term.worse.as_slice() {
-        [] => format!("removes {:.0} % of the gap", 100.0 * term.gap_reduction),
-        worse => format!("the gap does not shrink: {} gets worse", worse.join(", ")),
-    }
+    format!("removes {:.0} % of the gap", 100.0 * term.gap_reduction)
 }
 
 /// The most probable answer, and what it does to the map.
@@ -316,11 +313,12 @@ fn answer(diagnosis: &Diagnosis) -> String {
                 "{OUTSIDE} is the most probable{suffix} ({})",
                 probability_text(diagnosis.probability_outside)
             );
-            let Some(term) = diagnosis.probable_closure_term() else { return outside };
-            let closure = format!("{} (closure term, {})", term.sentence, probability_text(term.probability));
-            match &term.beside_cause {
-                Some(beside) => format!("{} and {closure} explain the gap{suffix} together", members(beside)),
-                None => format!("{outside}: {closure}"),
+            match first.filter(|first| first.has_closure()) {
+                Some(first) if first.effects.len() > 1 => {
+                    format!("{} explain the gap{suffix}", members(first))
+                }
+                Some(first) => format!("{outside}: {}", members(first)),
+                None => outside,
             }
         }
     }
@@ -394,21 +392,19 @@ fn nearest(diagnosis: &Diagnosis) -> Option<String> {
     }
 }
 
-/// Each effect with its sizes and its own probability.
+/// Each member with its sizes and its own probability.
 fn members(candidate: &Candidate) -> String {
     let member = |((id, name), probability): ((&String, &String), &f64)| {
+        let probability = probability_text(*probability);
+        if id == Candidate::CLOSURE {
+            return format!("{name} (closure term, {probability})");
+        }
         let own = candidate.parameters.iter().filter(|(key, _)| key.split('.').next() == Some(id));
         let sizes: Vec<&str> = own.map(|(_, estimate)| estimate.size.as_str()).collect();
-        format!("{name} ({id}) {} ({})", sizes.join(", "), probability_text(*probability))
+        format!("{name} ({id}) {} ({probability})", sizes.join(", "))
     };
-    candidate
-        .effects
-        .iter()
-        .zip(&candidate.names)
-        .zip(&candidate.each)
-        .map(member)
-        .collect::<Vec<_>>()
-        .join(", ")
+    let ids = candidate.effects.iter().zip(&candidate.names);
+    ids.zip(&candidate.each).map(member).collect::<Vec<_>>().join(" and ")
 }
 
 /// Effects by their names, with ids and onset times.

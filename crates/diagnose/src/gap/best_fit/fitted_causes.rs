@@ -26,16 +26,10 @@ pub(crate) struct CauseFit {
 }
 
 impl CauseFit {
-    pub(crate) fn of(fit: &Fit) -> CauseFit {
+    pub(crate) fn of(fit: &Fit, closure: Option<&ClosureKey>) -> CauseFit {
         let covariance = Some(&fit.covariance).filter(|all| all.iter().all(|one| one.is_finite()));
-        CauseFit { hypothesis: fit.hypothesis.clone(), covariance: covariance.cloned(), closure: None }
-    }
-
-    /// The same of a fit whose last effect is a closure term, which `study` gets; `None` if `study` has other steps.
-    pub(crate) fn with_closure(fit: &Fit, key: &ClosureKey, study: &mut Study) -> Option<CauseFit> {
-        let mut fit = CauseFit { closure: Some(key.clone()), ..CauseFit::of(fit) };
-        fit.hypothesis.effects.last_mut()?.0 = key.add_to(study)?;
-        Some(fit)
+        let covariance = covariance.cloned();
+        CauseFit { hypothesis: fit.hypothesis.clone(), covariance, closure: closure.cloned() }
     }
 }
 
@@ -44,8 +38,8 @@ impl CauseFit {
 pub(crate) struct Fits {
     pub(crate) null: CauseFit,
     pub(crate) causes: Vec<CauseFit>,
-    /// Those of the first closure term, and of those that the recording does not distinguish from it.
-    pub(crate) closures: Vec<CauseFit>,
+    /// That of the closure term, also of one that is not probable.
+    pub(crate) closure: Option<CauseFit>,
 }
 
 #[derive(Debug, Clone, PartialEq)]

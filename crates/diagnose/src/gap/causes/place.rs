@@ -6,7 +6,7 @@
 
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::causes::additions::Calibration;
-use crate::gap::causes::probabilities::prior_of_number;
+use crate::gap::causes::probabilities::{prior, weight};
 use crate::gap::report::Place;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::prediction::PointState;
@@ -46,13 +46,12 @@ pub(crate) struct Explanation<'a> {
     pub parts: Vec<Part<'a>>,
 }
 
-pub(crate) fn rarity(calibration: &Calibration, study: &Study) -> f64 {
-    let prior = |effects: usize| prior_of_number(calibration, study.catalogue, effects);
-    prior(0) - prior(1)
-}
-
-/// Converts fits to explanations. `fits` are effects and combinations, best first; `rarity`: see [`rarity`].
-pub(crate) fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>], rarity: f64) -> Vec<Explanation<'a>> {
+/// Converts fits to explanations. `fits` are effects and combinations, best first.
+pub(crate) fn of_fits<'a>(
+    study: &'a Study,
+    fits: &'a [Gain<'_>],
+    calibration: &Calibration,
+) -> Vec<Explanation<'a>> {
     let explanation = |candidate: &'a Gain<'_>| {
         let all = members(&candidate.fit.hypothesis);
         let parts = all.iter().map(|effect| {
@@ -66,9 +65,9 @@ pub(crate) fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>], rarity: f64) -
             }
         });
         // Scores of fits to some steps and to all steps are not comparable; gains are.
-        let chosen: f64 = all.iter().filter_map(|effect| study.rarities.get(effect)).sum();
-        let score = 0.5 * candidate.gain - chosen - rarity * all.len() as f64;
-        Explanation { score, parts: parts.collect() }
+        let rarity = prior(calibration, study, &candidate.fit.hypothesis);
+        let nothing = prior(calibration, study, &study.nothing());
+        Explanation { score: 0.5 * candidate.gain + rarity - nothing, parts: parts.collect() }
     };
     fits.iter().map(explanation).collect()
 }
@@ -89,15 +88,14 @@ pub(crate) fn places(
     fits: &[Gain<'_>],
     named: Option<usize>,
 ) -> Vec<Place> {
-    let rarity = rarity(calibration, study);
     let considered = named.map_or(fits, |causes| &fits[..fits.len().min(causes)]);
     // The other fits give each member's contribution.
-    let mut explanations = of_fits(study, fits, rarity);
+    let mut explanations = of_fits(study, fits, calibration);
     explanations.truncate(considered.len());
     if named.is_some() {
         // Fits to the same steps: their evidence is comparable.
         for (explanation, Gain { fit, .. }) in explanations.iter_mut().zip(considered) {
-            explanation.score = fit.score - rarity * fit.hypothesis.effects.len() as f64;
+            explanation.score = weight(calibration, study, fit);
         }
     }
     places_of(

@@ -200,7 +200,8 @@ impl Causes for Search<'_> {
     }
 }
 
-/// Removes effects whose 95 % interval contains neutral, and onsets without evidence against the same effect throughout.
+/// Removes effects whose 95 % interval contains neutral, onsets without evidence against the same effect throughout, and sets of which a part is
+/// among the fits and lacks less than the evidence of a cause for each further member.
 pub(crate) fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
     let simpler = |fit: &Fit| -> Option<Fit> {
         let study = search.study;
@@ -225,7 +226,16 @@ pub(crate) fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
         }
         kept.push(fit);
     }
-    ranked(search, kept.iter())
+    let kept = ranked(search, kept.iter());
+    let is_demanded = |fit: &&Fit| {
+        let all = members(&fit.hypothesis);
+        !kept.iter().any(|part| {
+            let some = members(&part.hypothesis);
+            let needed = search.calibration.threshold * all.len().saturating_sub(some.len()) as f64;
+            search.ln_odds(fit) - search.ln_odds(part) < needed && some.iter().all(|one| all.contains(one))
+        })
+    };
+    kept.iter().filter(is_demanded).cloned().collect()
 }
 
 /// The first effect of a fit whose 95 % intervals all contain neutral.

@@ -26,28 +26,17 @@ pub(crate) struct Combined<'a> {
     library: &'a LibraryFits,
     calibration: &'a Calibration,
     pub(crate) terms: TermSearch,
-    /// Steps on which closure terms are chosen.
-    pub(crate) training: Selection,
     everywhere: Selection,
     /// Fits to all steps, of sets with a closure term and of their subsets.
     known: Known<Fit>,
 }
 
 impl<'a> Combined<'a> {
-    pub(crate) fn new(
-        library: &'a LibraryFits,
-        calibration: &'a Calibration,
-        held_out: &[usize],
-    ) -> Combined<'a> {
-        let everywhere = Selection::all(&library.study);
-        let mut training = everywhere.clone();
-        held_out.iter().for_each(|step| training.steps[*step] = false);
-        let terms = TermSearch {
-            study: library.study.clone(),
-            library: term_library::library(),
-            closures: BTreeMap::new(),
-        };
-        Combined { library, calibration, terms, training, everywhere, known: Known::default() }
+    pub(crate) fn new(library: &'a LibraryFits, calibration: &'a Calibration) -> Combined<'a> {
+        let (study, closures) = (library.study.clone(), BTreeMap::new());
+        let terms = TermSearch { study, library: term_library::library(), closures };
+        let (everywhere, known) = (Selection::all(&library.study), Known::default());
+        Combined { library, calibration, terms, everywhere, known }
     }
 
     /// Searches from no cause; if that leaves a gap also from library causes, and last for terms that begin during the recording.
@@ -128,30 +117,29 @@ impl<'a> Combined<'a> {
         let changes = base.changes(library);
         let usable: Vec<usize> = (0..changes.len()).filter(|place| changes[*place].is_some()).collect();
         let columns: Vec<Vec<f64>> = changes.into_iter().flatten().collect();
-        let training = &self.training.steps;
-        let Some(products) = Products::new(base, &columns).projected(training) else { return };
+        let steps = &self.everywhere.steps;
+        let Some(products) = Products::new(base, &columns).projected(steps) else { return };
         let choices = choices(library, &usable, &products);
         let chosen = if late {
-            begun(base, library, &choices, training).unwrap_or_default()
+            begun(base, library, &choices, steps).unwrap_or_default()
         } else {
             promising(library, &choices)
         };
         self.fit(base, &chosen);
     }
 
-    /// Fits choices with model runs: to the training steps, and the best of them to all steps.
+    /// Fits choices with model runs, the best of them with more effort.
     fn fit(&mut self, base: &Base<'_>, chosen: &[Choice]) {
-        let terms = &mut self.terms;
+        let Combined { terms, everywhere, .. } = self;
         let starts: Vec<_> = chosen.iter().map(|choice| terms.start(&base.hypothesis, choice)).collect();
-        let mut trained = terms.fit(starts.into_iter(), base.linearised, &self.training, QUICK);
-        keep_determined(&terms.library, &mut trained);
-        trained.truncate(1 + MAX_EQUIVALENT);
-        let Some(best) = trained.first() else { return };
+        let mut quick = terms.fit(starts.into_iter(), base.linearised, everywhere, QUICK);
+        keep_determined(&terms.library, &mut quick);
+        quick.truncate(1 + MAX_EQUIVALENT);
+        let Some(best) = quick.first() else { return };
         // Tolerances act differently in the presence of a strong term.
-        let at_trained = base.linearised.at(&terms.study, &best.fit.hypothesis).ok();
-        let linearised = at_trained.as_ref().unwrap_or(base.linearised);
-        let restarts = trained.iter().map(FittedClosure::restart);
-        let mut fitted = terms.fit(restarts, linearised, &self.everywhere, EFFORT);
+        let at_best = base.linearised.at(&terms.study, &best.fit.hypothesis).ok();
+        let linearised = at_best.as_ref().unwrap_or(base.linearised);
+        let mut fitted = terms.fit(quick.iter().map(FittedClosure::restart), linearised, everywhere, EFFORT);
         keep_determined(&terms.library, &mut fitted);
         let mut known = std::mem::take(&mut self.known);
         fitted.into_iter().for_each(|closure| known.keep(&self.at(linearised), closure.fit));
@@ -167,30 +155,22 @@ impl<'a> Combined<'a> {
         self.known = known;
     }
 
-    /// The most probable sets with a closure term, without members that the recording does not support; the closure term is the last member.
-    pub(crate) fn sets(&mut self) -> Vec<FittedClosure> {
+    /// The most probable sets with a closure term, without members that the recording does not support, and where they were linearised. The closure
+    /// term is the last member.
+    pub(crate) fn sets(&self) -> Option<(Vec<FittedClosure>, Linearised)> {
         let mut ranked = self.ranked();
         ranked.truncate(1 + 2 * MAX_EQUIVALENT);
-        let Some(best) = ranked.first() else { return Vec::new() };
-        let there = self.library.linearised.at(&self.terms.study, &best.hypothesis).ok();
-        let linearised = there.as_ref().unwrap_or(&self.library.linearised);
-        let kept = supported(&self.at(linearised), ranked);
+        let there = self.library.linearised.at(&self.terms.study, &ranked.first()?.hypothesis).ok()?;
+        let search = self.at(&there);
+        let kept = supported(&search, ranked);
         let restart = |fit: &Fit| {
             let (effect, choice) = self.closure_of(fit)?;
             let mut last = fit.hypothesis.clone();
             last.effects.sort_by_key(|(index, _)| *index == effect);
             Some((choice.clone(), effect, (&last).into()))
         };
-        let mut sets = self.terms.fit(kept.iter().filter_map(restart), linearised, &self.everywhere, EFFORT);
-        let ln_odds = |set: &FittedClosure| self.at(linearised).ln_odds(&set.fit);
-        sets.sort_by(|a, b| ln_odds(b).total_cmp(&ln_odds(a)));
-        sets
-    }
-
-    /// The fit of a set to the training steps alone.
-    pub(crate) fn trained(&self, closure: &FittedClosure) -> Option<Fit> {
-        let there = self.library.linearised.at(&self.terms.study, &closure.fit.hypothesis).ok()?;
-        let restart = std::iter::once(closure.restart());
-        Some(self.terms.fit(restart, &there, &self.training, EFFORT).into_iter().next()?.fit)
+        let mut sets = self.terms.fit(kept.iter().filter_map(restart), &there, &self.everywhere, EFFORT);
+        sets.sort_by(|a, b| search.ln_odds(&b.fit).total_cmp(&search.ln_odds(&a.fit)));
+        Some((sets, there))
     }
 }

@@ -6,16 +6,17 @@ use crate::closure::description::{ClosureDescription, describe, script_of};
 use crate::closure::residual_source::{ResidualSource, residual_sources};
 use crate::closure::select::{ClosureKey, FittedClosure};
 use crate::closure::term::{Balance, Properties};
-use crate::gap::best_fit::fit::{Effort, Fit, adequacy, fit, misfit_of_steps, with_start_read};
+use crate::gap::best_fit::fit::{Fit, adequacy};
 use crate::gap::best_fit::normal::Selection;
 use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::place::{Explanation, Gain, LINEARISATION_ERROR_RATIO, Part, of_fits, places_of};
 use crate::gap::causes::probabilities::{candidate_of, cause_set, weight};
 use crate::gap::causes::select::MIN_GAP_REDUCTION;
-use crate::gap::gap_reduction::channels_on;
+use crate::gap::gap_reduction::{Compared, held_out_gap};
 use crate::gap::library_fits::LibraryFits;
-use crate::gap::report::{BalanceClosure, Candidate, ClosureTerm, MAX_EQUIVALENT, Place};
+use crate::gap::report::{BalanceClosure, Candidate, ClosureTerm, Gap, MAX_EQUIVALENT, Place};
 use crate::gap::residuals::study::Study;
+use crate::gap::residuals::whiten::Linearised;
 use mapper_core::half_width_95;
 use mapper_inference::posterior::{CauseProbabilities, CauseSet, RankedCause, Rules};
 
@@ -34,6 +35,8 @@ pub(crate) struct Discovered {
 #[derive(Debug)]
 pub(crate) struct Proposed {
     pub(crate) closure_term: ClosureTerm,
+    /// The gap before and after the best cause.
+    pub(crate) gap: Gap,
     /// The recording with the closure terms of the causes.
     pub(crate) study: Study,
     /// Probability of no cause.
@@ -61,11 +64,12 @@ pub(crate) fn discover(
     let LibraryFits { study, linearised, .. } = library;
     progress(0.0, "closure terms");
     let nothing = Base::nothing(study, linearised);
-    let mut combined = Combined::new(library, calibration, held_out_steps(library));
+    let mut combined = Combined::new(library, calibration);
     combined.search(&nothing);
     progress(0.6, "residual of the closure term");
-    let sets = combined.sets();
-    let proposed = propose(library, calibration, &combined, &sets);
+    let found = combined.sets();
+    let proposed = found.as_ref().and_then(|found| propose(library, calibration, &combined, found));
+    let sets = found.map_or_else(Vec::new, |(sets, _)| sets);
     // If a closure term leaves only noise, linear gains of other parts are irrelevant.
     let closure = proposed.as_ref().map(|proposed| &proposed.closure_term);
     let settled = closure.filter(|closure| closure.probability > 0.5);
@@ -76,23 +80,8 @@ pub(crate) fn discover(
     };
     let residual_sources = residual_sources(&nothing, &Selection::all(study).steps, &here);
     let places = places((library, calibration), &combined, &sets, &residual_sources, bend);
-    Discovered {
-        residual_sources: residual_sources
-            .into_iter()
-            .take(1 + MAX_EQUIVALENT)
-            .map(reported_source)
-            .collect(),
-        places: Some(places),
-        proposed,
-    }
-}
-
-/// Steps withheld while a closure term is chosen: the first fold. A search for each fold would take three times as long.
-fn held_out_steps(library: &LibraryFits) -> &[usize] {
-    match library.folds.steps.as_slice() {
-        [first, _, ..] => first,
-        _ => &[],
-    }
+    let reported = residual_sources.into_iter().take(1 + MAX_EQUIVALENT).map(reported_source);
+    Discovered { residual_sources: reported.collect(), places: Some(places), proposed }
 }
 
 /// The best closure term, if its set passes all tests.
@@ -100,10 +89,10 @@ fn propose(
     library: &LibraryFits,
     calibration: &Calibration,
     combined: &Combined<'_>,
-    sets: &[FittedClosure],
+    (sets, there): &(Vec<FittedClosure>, Linearised),
 ) -> Option<Proposed> {
     let LibraryFits { linearised, null, fits, .. } = library;
-    let (terms, training) = (&combined.terms, &combined.training);
+    let terms = &combined.terms;
     let study = &terms.study;
     let best = sets.first()?;
     let weight = |fit: &Fit| weight(calibration, study, fit);
@@ -121,14 +110,12 @@ fn propose(
     let rules = Rules { unlisted: 0.0, ..calibration.rules() };
     let causes = &all.iter().map(set).collect::<Vec<CauseSet>>();
     let probabilities = rules.cause_probabilities(weight(null), causes, left);
-    let before = fit(study, linearised, &study.nothing(), training, Effort::default()).ok()?;
-    let held_out = held_out_steps(library);
-    let read = |fit: Fit| if training.steps[0] { fit } else { with_start_read(study, linearised, fit) };
-    let (before, after) = (read(before), read(combined.trained(best)?));
-    let gap_reduction = gap_reduction(study, &before, &after, held_out);
-    let (channels, worse) = channels_on(study, linearised, [&before, &after], held_out);
-    // A closure term that makes a channel worse on steps that it has not seen closes nothing.
-    if gap_reduction < MIN_GAP_REDUCTION || !worse.is_empty() {
+    let alike = probabilities.causes.iter().take(probabilities.alike.clamp(1, 1 + MAX_EQUIVALENT));
+    let alike: Vec<&Fit> = alike.map(|cause| all[cause.set].0).collect();
+    let compared = Compared { study, linearised: [linearised, there], null, causes: &alike, weight: &weight };
+    let gap = held_out_gap(compared, &library.folds);
+    // A closure term that makes a channel worse on steps that its fit has not seen closes nothing.
+    if gap.gap_reduction < MIN_GAP_REDUCTION || !gap.worse.is_empty() {
         return None;
     }
     let describe =
@@ -150,9 +137,8 @@ fn propose(
         (candidate_of(cause), all[cause.set].0.clone(), key)
     });
     let found: Vec<(Candidate, Fit, Option<ClosureKey>)> = found.collect();
-    let alike = probabilities.alike.min(1 + MAX_EQUIVALENT);
     let ClosureDescription { sentence, terms: coefficients, .. } = description;
-    let others = found[..alike].iter().filter_map(|(cause, ..)| cause.closure().cloned());
+    let others = found[..alike.len()].iter().filter_map(|(cause, ..)| cause.closure().cloned());
     let beside = found.first().map_or(&[][..], |(cause, ..)| &cause.effects);
     let beside = beside.iter().filter(|id| *id != Candidate::CLOSURE).cloned().collect();
     let closure_term = ClosureTerm {
@@ -161,15 +147,14 @@ fn propose(
         sentence,
         terms: coefficients,
         probability: probabilities.of_member(causes, best.effect),
-        gap_reduction,
-        held_out_steps: held_out.len(),
-        channels,
+        gap_reduction: gap.gap_reduction,
+        held_out_steps: gap.held_out_steps.len(),
         beside,
         rhai: None,
         script,
     };
     let CauseProbabilities { none, unmodelled, .. } = probabilities;
-    Some(Proposed { closure_term, study: study.clone(), none, unmodelled, causes: found })
+    Some(Proposed { closure_term, gap, study: study.clone(), none, unmodelled, causes: found })
 }
 
 /// Locations from all explanations tried: effects, closure terms, source terms.
@@ -220,16 +205,4 @@ fn reported_source(source: ResidualSource) -> BalanceClosure {
             .map(|(level, sigma)| [*level, level - half_width_95(*sigma), level + half_width_95(*sigma)])
             .collect(),
     }
-}
-
-/// Gap reduction by a closure term: `1 - sum g_after+/sum g_before+`, `g = (|r|^2 - n)/n`, over the held-out steps, or all if there are none.
-fn gap_reduction(study: &Study, before: &Fit, after: &Fit, held_out: &[usize]) -> f64 {
-    let all: Vec<usize> = (0..study.steps.len()).collect();
-    let steps = if held_out.is_empty() { &all } else { held_out };
-    let of = |fit: &Fit| {
-        let misfit = misfit_of_steps(study, &fit.residual);
-        steps.iter().map(|step| misfit[*step].max(0.0)).sum::<f64>()
-    };
-    let (before, after) = (of(before), of(after));
-    if before > 0.0 { 1.0 - after / before } else { 0.0 }
 }

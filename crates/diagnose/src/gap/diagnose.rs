@@ -152,7 +152,7 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         inseparable: inseparable(&library, &posterior),
         closure_terms: closure.proposed.iter().map(|proposed| proposed.closure_term.clone()).collect(),
         closure_terms_by_balance: if is_outside_tolerance { closure.residual_sources } else { Vec::new() },
-        gap,
+        gap: settled.map_or(gap, |proposed| proposed.gap.clone()),
         map_effect: None,
         lists_all: false,
         next,

@@ -156,12 +156,10 @@ pub struct ClosureTerm {
     pub terms: Vec<ClosureCoefficient>,
     /// Probability of this term among all terms tried and none.
     pub probability: f64,
-    /// Share of the gap removed on steps used neither to find nor to fit the term; no channel gets worse there.
+    /// Share of the gap removed on held-out steps, where no channel gets worse.
     pub gap_reduction: f64,
     /// Number of these held-out steps.
     pub held_out_steps: usize,
-    /// Gap of each channel on these steps.
-    pub channels: BTreeMap<String, ChannelGap>,
     /// Library effects fitted together with the term; empty if it was found alone.
     pub beside: Vec<String>,
     /// Closure terms that the recording cannot distinguish from this one, as sentences.

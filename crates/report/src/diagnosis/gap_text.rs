@@ -6,10 +6,9 @@ use crate::document::{Cell, Describe, Document, Table};
 use crate::formatting::{Message, display_scale, four_figures};
 use mapper_core::{Channel, probability_text, step_number, valve_area_text, with_unit};
 use mapper_diagnose::gap::{
-    Baseline, BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosed, Diagnosis, Estimate, Evidence, Gap,
-    MapEffect, PointGap, SmallestSeen, Verdict,
+    Baseline, BeyondPrior, Candidate, ClosureTerm, Diagnosed, Diagnosis, Estimate, Evidence, Gap, MapEffect,
+    PointGap, SmallestSeen, Verdict,
 };
-use std::collections::BTreeMap;
 
 /// Maximum number of causes shown.
 const CAUSES: usize = 8;
@@ -457,19 +456,8 @@ fn describe_support(gap: &Gap) -> String {
 fn add_gap_reduction(document: &mut Document, diagnosis: &Diagnosis) {
     let gap = &diagnosis.gap;
     let mut body = Document::default();
-    if let Some(term) = diagnosis.probable_closure_term() {
-        let steps: usize = gap.folds.iter().map(Vec::len).sum();
-        let basis = match term.held_out_steps {
-            0 => "on the fitted steps; there are too few to hold any out".to_owned(),
-            held => {
-                format!("on {held} of {steps} steps, used neither to find the closure term nor to fit it")
-            }
-        };
-        body.text(describe_removed_residual(term));
-        body.table(by_channel(diagnosis, &term.channels, "with the term", 3));
-        return document.section(format!("Gap reduction, {basis}"), body);
-    }
-    let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
+    let closure = diagnosis.probable_closure_term().is_some();
+    let named = closure || diagnosis.verdict.names_a_cause();
     let basis = match gap.folds.len() {
         0 | 1 => "on the fitted steps; there are too few to hold any out".to_owned(),
         folds => format!("on {} held-out steps ({folds}-fold cross-validation)", gap.held_out_steps.len()),
@@ -490,7 +478,7 @@ fn add_gap_reduction(document: &mut Document, diagnosis: &Diagnosis) {
     } else if !gap.worse.is_empty() {
         body.text(format!("the gap does not shrink: {} gets worse", gap.worse.join(", ")));
     }
-    body.table(by_channel(diagnosis, &gap.channels, "with the cause", if named { 3 } else { 2 }));
+    body.table(by_channel(diagnosis, if named { 3 } else { 2 }));
     body.text(describe_affected_points(diagnosis).unwrap_or_default());
     if named {
         body.text(describe_strained_tolerance(gap).unwrap_or_default());
@@ -524,18 +512,13 @@ fn describe_strained_tolerance(gap: &Gap) -> Option<String> {
 }
 
 /// The rms residual of each channel in the first so many columns.
-fn by_channel(
-    diagnosis: &Diagnosis,
-    channels: &BTreeMap<String, ChannelGap>,
-    with: &str,
-    columns: usize,
-) -> Table {
+fn by_channel(diagnosis: &Diagnosis, columns: usize) -> Table {
     let bare = if diagnosis.baseline.is_some() { "baseline" } else { "nominal" };
     let heads = ["rms residual", "unit"]
         .into_iter()
-        .chain([bare, "tolerances fitted", with].into_iter().take(columns));
+        .chain([bare, "tolerances fitted", "with the cause"].into_iter().take(columns));
     let mut table = Table::new(heads).with_texts([1]);
-    for (channel, row) in channels {
+    for (channel, row) in &diagnosis.gap.channels {
         let (scale, unit) = display_scale(&row.unit);
         let values = [row.nominal, row.before, row.after].into_iter().take(columns);
         let values = values.map(|value| four_figures(scale * value));

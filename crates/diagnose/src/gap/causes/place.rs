@@ -139,7 +139,11 @@ pub(crate) fn places_of(
         }
     }
     parts.sort_by(|a, b| b.1.total_cmp(&a.1));
-    parts.retain(|(_, share, ..)| *share >= LINEARISATION_ERROR_RATIO);
+    // A fitted cause is where its members are, however small; other parts may be due to the linearisation.
+    let first = explanations.iter().zip(&weights).max_by(|a, b| a.1.total_cmp(b.1)).filter(|_| bend == 0.0);
+    let of_first: Vec<Submodel> =
+        first.iter().flat_map(|(explanation, _)| &explanation.parts).map(|part| part.submodel).collect();
+    parts.retain(|(part, share, ..)| *share >= LINEARISATION_ERROR_RATIO || of_first.contains(part));
     let points = study.points(&null.hypothesis).unwrap_or_default();
     let shown = parts.into_iter().filter_map(|(submodel, share, _, part)| {
         Some((submodel, share, show(study, linearised, &(part.signature)()?, &points)?))

@@ -496,16 +496,14 @@ pub(crate) const MAX_REFITTED: usize = 7;
 pub(crate) const MAX_EQUIVALENT: usize = 2;
 
 impl Diagnosis {
-    /// Causes to list: the first if it is named, and others that are not improbable.
+    /// Causes to list: the first if it explains the gap, and others that are not improbable.
     pub fn listed(&self) -> impl Iterator<Item = &Candidate> {
-        self.candidates
-            .iter()
-            .enumerate()
-            .filter(|(place, c)| {
-                let is_named = *place == 0 && self.verdict.names_a_cause();
-                is_named || self.lists_all || c.probability >= LISTED
-            })
-            .map(|(_, c)| c)
+        let explains = |place| place == 0 && self.verdict == Verdict::Explained;
+        let candidates = self.candidates.iter().enumerate();
+        let listed = move |(place, c): &(usize, &Candidate)| {
+            explains(*place) || self.lists_all || c.probability >= LISTED
+        };
+        candidates.filter(listed).map(|(_, c)| c)
     }
 
     /// The closure term that is more probable than not; `None` if there is none.

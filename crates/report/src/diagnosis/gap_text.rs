@@ -380,14 +380,19 @@ pub(crate) fn part_name(submodel: &str) -> String {
 }
 
 fn nearest(diagnosis: &Diagnosis) -> Option<String> {
-    let first = diagnosis.candidates.first()?;
-    match diagnosis.verdict {
-        Verdict::PartlyExplained => Some(format!(
+    let first = diagnosis.listed().next();
+    if first.is_some_and(Candidate::has_closure) {
+        return None;
+    }
+    match (diagnosis.verdict, first) {
+        (Verdict::PartlyExplained, Some(first)) => Some(format!(
             "nearest in the effect library: {}, whose residual exceeds the declared tolerances",
             candidate_name(first)
         )),
-        Verdict::Unexplained => Some("no effect of the library comes near".to_owned()),
-        Verdict::WithinTolerance | Verdict::Explained => None,
+        (Verdict::PartlyExplained | Verdict::Unexplained, _) => {
+            Some("no effect of the library comes near".to_owned())
+        }
+        (Verdict::WithinTolerance | Verdict::Explained, _) => None,
     }
 }
 

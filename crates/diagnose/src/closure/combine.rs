@@ -21,8 +21,6 @@ const EFFORT: Effort =
 const QUICK: Effort = Effort { iterations: 3, enough: 1.0, exact: false, ..EFFORT };
 /// Maximum number of sets of effects beside which closure terms are tried, after the first ones. Bound: effort; two mostly agree.
 const MAX_ROUNDS: usize = 2;
-/// Number of closure terms beside which effects are tried at a time. Bound: effort.
-const CLIMBS: usize = 2;
 
 pub(crate) struct Combined<'a> {
     library: &'a LibraryFits,
@@ -31,8 +29,6 @@ pub(crate) struct Combined<'a> {
     everywhere: Selection,
     /// Fits to all steps, of sets with a closure term and of their subsets.
     known: Known<Fit>,
-    /// Sets beside which effects were tried.
-    climbed: BTreeSet<Vec<usize>>,
 }
 
 impl<'a> Combined<'a> {
@@ -40,7 +36,7 @@ impl<'a> Combined<'a> {
         let (study, closures) = (library.study.clone(), BTreeMap::new());
         let terms = TermSearch { study, library: term_library::library(), closures };
         let (everywhere, known) = (Selection::all(&library.study), Known::default());
-        Combined { library, calibration, terms, everywhere, known, climbed: BTreeSet::new() }
+        Combined { library, calibration, terms, everywhere, known }
     }
 
     /// Searches from no cause; if that leaves a gap also from library causes, and last for terms that begin during the recording.
@@ -52,6 +48,7 @@ impl<'a> Combined<'a> {
             if !self.leaves_only_noise() {
                 let LibraryFits { study, linearised, .. } = self.library;
                 for fit in self.library.bases() {
+                    tried.insert(members(&fit.hypothesis));
                     if let Ok(there) = linearised.at(study, &fit.hypothesis) {
                         self.add_terms(&Base::at_fit(study, &there, fit), late);
                     }
@@ -150,20 +147,13 @@ impl<'a> Combined<'a> {
         self.known = known;
     }
 
-    /// Adds, replaces and removes effects beside the best closure terms: of two terms, one may stand for an effect.
+    /// Adds, replaces and removes effects beside the best closure term.
     fn add_effects(&mut self) {
-        let mut best = self.ranked();
-        let mut closures = BTreeSet::new();
-        best.retain(|fit| self.closure_of(fit).is_some_and(|(closure, _)| closures.insert(closure)));
-        for fit in best.iter().take(CLIMBS) {
-            if let Ok(there) = self.library.linearised.at(&self.terms.study, &fit.hypothesis)
-                && self.climbed.insert(members(&fit.hypothesis))
-            {
-                let mut known = std::mem::take(&mut self.known);
-                climb(&self.at(&there), &mut known, fit, LIMITS);
-                self.known = known;
-            }
-        }
+        let Some(best) = self.ranked().into_iter().next() else { return };
+        let Ok(there) = self.library.linearised.at(&self.terms.study, &best.hypothesis) else { return };
+        let mut known = std::mem::take(&mut self.known);
+        climb(&self.at(&there), &mut known, &best, LIMITS);
+        self.known = known;
     }
 
     /// The most probable sets with a closure term, without members that the recording does not support, and where they were linearised. The closure
@@ -181,7 +171,6 @@ impl<'a> Combined<'a> {
             Some((choice.clone(), effect, (&last).into()))
         };
         let mut sets = self.terms.fit(kept.iter().filter_map(restart), &there, &self.everywhere, EFFORT);
-        keep_determined(&self.terms.library, &mut sets);
         sets.sort_by(|a, b| search.ln_odds(&b.fit).total_cmp(&search.ln_odds(&a.fit)));
         Some((sets, there))
     }

@@ -79,12 +79,14 @@ pub(crate) fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64
             add(&[place], simple);
         }
     }
-    let pairs = (0..usable.len()).flat_map(|a| (0..a).map(move |b| (b, a)));
-    let terms = |(a, b)| [&library[usable[a]], &library[usable[b]]];
-    for (a, b) in pairs.filter(|pair| go_together(terms(*pair)[0], terms(*pair)[1])) {
-        // Level and slope form one closure term, with its own temperature; others are two causes, each chosen from all.
-        let sink = terms((a, b)).iter().any(|term| term.role == Role::Slope);
-        add(&[a, b], if sink { simple } else { 1.0 + 2.0 * simple });
+    let pairs: Vec<(usize, usize)> = (0..usable.len())
+        .flat_map(|a| (0..a).map(move |b| (b, a)))
+        .filter(|(a, b)| go_together(&library[usable[*a]], &library[usable[*b]]))
+        .collect();
+    for (a, b) in &pairs {
+        // Level and slope form one closure term, with its own temperature.
+        let sink = library[usable[*a]].role == Role::Slope || library[usable[*b]].role == Role::Slope;
+        add(&[*a, *b], if sink { simple } else { 1.0 + (pairs.len() as f64).ln() });
     }
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     found

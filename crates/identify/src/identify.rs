@@ -1,12 +1,12 @@
 //! From a recording to points, one for each step, in three stages: what each step shows ([`Evidence`]), the estimates with the faults that
 //! explain contradictions ([`Estimated`]), and the points.
 
+use crate::config::missing;
 use crate::estimates::Estimated;
 use crate::evidence::Evidence;
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
 use crate::joint::DynamicEfficiency;
-use crate::needs::missing;
 use crate::points::points_with_budgets;
 use crate::single_step::dynamic::FittedReadings;
 use crate::step_data::humidity::with_measured_humidity;

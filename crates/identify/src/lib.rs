@@ -25,7 +25,6 @@ mod faults;
 mod identify;
 mod isothermal_zero;
 mod joint;
-mod needs;
 mod points;
 mod reading_checks;
 mod reduce;
@@ -37,6 +36,7 @@ mod turbine;
 pub use blade_count::{BladeCount, blade_count};
 pub use config::{
     Allowance, DeclaredUncertainty, Housing, IdentifyConfig, NoiseColour, PressureTap, Thresholds,
+    method_for, needs,
 };
 pub use faults::end_readings::MAX_CORRELATED_ROWS;
 pub use faults::found_fault::{FoundFault, Machine, Suspect};
@@ -54,7 +54,6 @@ pub use joint::expected::expected_together;
 pub use joint::step_model::rows::BLOCK_S;
 pub use joint::{DynamicEfficiency, MAX_PRIOR_SENSITIVITY_ETA};
 pub use mapper_core::{Choice, JointSettings, SettleBands, WindowRule};
-pub use needs::{method_for, needs};
 pub use reading_checks::bounds::EFFICIENCY;
 pub use reduce::{KnownHeat, method_of_table, reduce};
 pub use single_step::dynamic::FittedReadings;

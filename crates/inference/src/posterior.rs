@@ -63,6 +63,14 @@ pub struct CauseProbabilities {
     pub alike: usize,
 }
 
+impl CauseProbabilities {
+    /// Probability of one cause, whatever the others: that of all `sets` with it.
+    pub fn of_member(&self, sets: &[CauseSet], member: usize) -> f64 {
+        let with = |cause: &&RankedCause| sets[cause.set].members.contains(&member);
+        self.causes.iter().filter(with).map(|cause| cause.probability).sum()
+    }
+}
+
 impl Rules {
     /// Difference of ln of the weights below which the data do not distinguish causes.
     pub fn ln_resolution(&self) -> f64 {

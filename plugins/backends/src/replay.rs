@@ -1,6 +1,6 @@
 //! Replays a recording as a rig.
 
-use crate::setpoint_limits;
+use crate::ACCEPTED_SETPOINTS;
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Element, ElementColumn, Event, EventKind, Group,
     Recording, RigDescription, RigMode, SafeTrajectory, SampleBatch, Series, Setpoints,
@@ -168,7 +168,7 @@ impl Backend for ReplayBackend {
             exclusive: None,
             reached_at: None,
             needs_guarded: Vec::new(),
-            accepts: Some(setpoint_limits::ACCEPTED),
+            accepts: Some(ACCEPTED_SETPOINTS),
             safe: SafeTrajectory::default(),
         }
     }
@@ -182,7 +182,7 @@ impl Backend for ReplayBackend {
     }
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
-        setpoint_limits::ACCEPTED.check(setpoints)?;
+        ACCEPTED_SETPOINTS.check(setpoints)?;
         self.require_armed("set")?;
         self.pending = Some(*setpoints);
         Ok(())

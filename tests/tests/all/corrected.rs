@@ -71,10 +71,10 @@ fn a_kept_diagnosis_corrects_as_a_new_one_and_only_its_own_recording() {
         if text[probability..].starts_with('9') { "8" } else { "9" },
     );
     refused("tampered.json", &tampered, &campaign.path, &recording);
-    refused("other.json", "{\"format_version\": 2}", &campaign.path, &recording);
+    refused("other.json", "{\"format_version\": 3}", &campaign.path, &recording);
     refused(
         "later.json",
-        &text.replace("\"format_version\": 2", "\"format_version\": 99"),
+        &text.replace("\"format_version\": 3", "\"format_version\": 99"),
         &campaign.path,
         &recording,
     );

@@ -3,21 +3,20 @@
 use crate::closure::columns::{Base, LinearEvidence, Products, linear_evidence};
 use crate::closure::expression::{Expression, Spans, product};
 use crate::closure::library::library;
-use crate::closure::residual_source::in_each_step;
 use crate::closure::term::{ClosureEffect, Role, Term};
 use crate::gap::best_fit::fit::{Effort, Fit, Start, fit};
 use crate::gap::best_fit::normal::{PRIOR_STEPS, Selection};
 use crate::gap::causes::select::MIN_GAP_REDUCTION;
 use crate::gap::report::MAX_EQUIVALENT;
 use crate::gap::residuals::study::{Hypothesis, Study};
-use crate::gap::residuals::whiten::Linearised;
+use crate::gap::residuals::whiten::{Linearised, rows_of_step};
 use mapper_core::step_number;
-use mapper_inference::hypotheses::Shape;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::HINT_SIGMAS;
 use mapper_physics::rig::effect::Effect;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Some library terms, by index, with their fit to the recording.
@@ -29,8 +28,6 @@ pub(crate) struct Choice {
     pub(crate) gain: f64,
     /// Evidence penalty for one choice among many.
     pub(crate) rarity: f64,
-    /// Onset step; 0 from the beginning.
-    pub(crate) begin: usize,
     /// Coefficients, in steps.
     pub(crate) coefficients: Vec<f64>,
     /// The same terms without their onset, by which a file names them.
@@ -73,7 +70,7 @@ pub(crate) fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64
         if !wrong && gain.is_finite() {
             let coefficients = coefficients.iter().copied().collect();
             let key = ClosureKey { terms: terms.clone(), begin: 0 };
-            found.push(Choice { terms, gain: gain - rarity, rarity, begin: 0, coefficients, key });
+            found.push(Choice { terms, gain: gain - rarity, rarity, coefficients, key });
         }
     };
     let simple = (usable.len() as f64).ln();
@@ -118,8 +115,7 @@ pub(crate) fn begun(
     library: &mut Vec<Term>,
     choices: &[Choice],
     counts: &[bool],
-    folds: &[Vec<bool>],
-) -> Option<(Vec<Choice>, f64)> {
+) -> Option<Vec<Choice>> {
     let part = |choice: &Choice| library[choice.terms[0]].submodel();
     let mut parts = Vec::new();
     for choice in choices {
@@ -148,49 +144,25 @@ pub(crate) fn begun(
     terms.dedup();
     let columns: Vec<Vec<f64>> =
         terms.iter().flat_map(|term| from_each_step(base, &library[*term])).collect();
-    let products = Products::new(base, &columns);
-    let best = |counts: &[bool]| {
-        let projected: DMatrix<f64> = products.projected(counts)?;
-        let mut found: Vec<Choice> = Vec::new();
-        for choice in &tried {
-            let rarity = choice.rarity + (steps as f64).ln();
-            for begin in 1..steps {
-                let places: Option<Vec<usize>> = choice
-                    .terms
-                    .iter()
-                    .map(|term| Some(terms.iter().position(|other| other == term)? * steps + begin))
-                    .collect();
-                let Some(evidence) = linear_evidence(&projected, &places?, PRIOR_STEPS) else { continue };
-                let coefficients: Vec<f64> = evidence.coefficients.iter().copied().collect();
-                let wrong = choice
-                    .terms
-                    .iter()
-                    .zip(&coefficients)
-                    .any(|(term, c)| library[*term].positive && *c < 0.0);
-                if !wrong && evidence.gain.is_finite() {
-                    found.push(Choice {
-                        gain: evidence.gain - rarity,
-                        rarity,
-                        begin,
-                        coefficients,
-                        terms: choice.terms.clone(),
-                        key: ClosureKey { begin, ..choice.key.clone() },
-                    });
-                }
+    let projected = Products::new(base, &columns).projected(counts)?;
+    let mut found: Vec<Choice> = Vec::new();
+    for choice in &tried {
+        let rarity = choice.rarity + (steps as f64).ln();
+        for begin in 1..steps {
+            let place = |term| Some(terms.iter().position(|other| other == term)? * steps + begin);
+            let places: Option<Vec<usize>> = choice.terms.iter().map(place).collect();
+            let Some(evidence) = linear_evidence(&projected, &places?, PRIOR_STEPS) else { continue };
+            let coefficients: Vec<f64> = evidence.coefficients.iter().copied().collect();
+            let mut signs = choice.terms.iter().zip(&coefficients);
+            let wrong = signs.any(|(term, c)| library[*term].positive && *c < 0.0);
+            if !wrong && evidence.gain.is_finite() {
+                let key = ClosureKey { begin, ..choice.key.clone() };
+                let (gain, terms) = (evidence.gain - rarity, choice.terms.clone());
+                found.push(Choice { gain, rarity, coefficients, terms, key });
             }
         }
-        found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        Some(found)
-    };
-    let found = best(counts)?;
-    let first = found.first()?;
-    let again = folds.iter().filter(|fold| {
-        let in_fold = best(fold);
-        let of_fold = in_fold.as_ref().and_then(|found| found.first());
-        of_fold
-            .is_some_and(|of_fold| of_fold.terms == first.terms && of_fold.begin.abs_diff(first.begin) <= 1)
-    });
-    let stability = again.count() as f64 / folds.len().max(1) as f64;
+    }
+    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut chosen: Vec<Choice> = Vec::new();
     for choice in found {
         if chosen.len() <= MAX_EQUIVALENT && chosen.iter().all(|other| other.terms != choice.terms) {
@@ -198,17 +170,17 @@ pub(crate) fn begun(
         }
     }
     for choice in &mut chosen {
-        let begin_s = base.study.steps[choice.begin].marker.start_s;
+        let begin_s = base.study.steps[choice.key.begin].marker.start_s;
         choice.terms = choice
             .terms
             .iter()
             .map(|term| {
-                library.push(from(&library[*term], begin_s, choice.begin));
+                library.push(from(&library[*term], begin_s, choice.key.begin));
                 library.len() - 1
             })
             .collect();
     }
-    Some((chosen, stability))
+    Some(chosen)
 }
 
 fn from(term: &Term, begin_s: f64, step: usize) -> Term {
@@ -222,21 +194,16 @@ fn from(term: &Term, begin_s: f64, step: usize) -> Term {
     later
 }
 
-/// Whitened changes for one step of a term's coefficient, for an onset at each step: the sum of the term's parts in the later steps.
+/// Whitened changes for one step of a term's coefficient, for an onset at each step. As for effects, memory of earlier steps does not count.
 fn from_each_step(base: &Base<'_>, term: &Term) -> Vec<Vec<f64>> {
-    let during = |spans: Spans| {
-        let mut during = term.clone();
-        for (_, formula) in &mut during.acts_on {
-            *formula = product(Expression::InTime(spans.clone()), formula.clone());
-        }
-        during
+    let change = base.changes(std::slice::from_ref(term)).swap_remove(0);
+    let change = change.unwrap_or_else(|| vec![0.0; base.residual.len()]);
+    let from = |step| {
+        let mut later = change.clone();
+        (0..step).for_each(|before| later[rows_of_step(base.study, before)].fill(0.0));
+        later
     };
-    let mut columns = in_each_step(base, Shape::Step, during, |terms| base.changes(terms));
-    for step in (1..columns.len()).rev() {
-        let (before, later) = columns.split_at_mut(step);
-        before[step - 1].iter_mut().zip(&later[0]).for_each(|(before, later)| *before += later);
-    }
-    columns
+    (0..base.study.steps.len()).map(from).collect()
 }
 
 /// Share of the range that a start may use. Bound: the fit needs some room on both sides.
@@ -294,6 +261,8 @@ pub(crate) struct TermSearch {
     /// The recording, with the library effects followed by the closure terms.
     pub(crate) study: Study,
     pub(crate) library: Vec<Term>,
+    /// The closure terms among the effects of the study.
+    pub(crate) closures: BTreeMap<usize, Choice>,
 }
 
 impl TermSearch {
@@ -327,7 +296,11 @@ impl TermSearch {
                 (steps * p.typical_step).clamp(START_RANGE_SHARE * p.low, START_RANGE_SHARE * p.high)
             })
             .collect();
-        let effect = self.study.add(Arc::new(closure));
+        let known =
+            self.closures.iter().find(|(_, known)| known.key == choice.key).map(|(effect, _)| *effect);
+        let effect = known.unwrap_or_else(|| self.study.add(Arc::new(closure)));
+        self.study.rarities.insert(effect, choice.rarity);
+        self.closures.insert(effect, choice.clone());
         let mut start = base.clone();
         start.effects.push((effect, values));
         (choice.clone(), effect, Start::from(&start))

@@ -1,6 +1,6 @@
 //! Calibrated model: machine, effects and tolerances from a diagnosis, its forecasts, and their verification.
 
-use crate::gap::best_fit::coordinate::{coordinates, infos};
+use crate::gap::best_fit::coordinate::coordinates;
 use crate::gap::best_fit::fit::{Fit, changes_near, effect_changes};
 use crate::gap::causes::additions::Calibration;
 use crate::gap::next_experiment::{SimulatedRig, simulated_steps};
@@ -85,21 +85,26 @@ pub enum CalibratedModelError {
 }
 
 impl Found {
-    /// The machine of a fit; `None` if the covariance cannot be formed.
+    /// The machine of a fit without its closure term; `None` if the covariance cannot be formed.
     pub(crate) fn of(study: &Study, fit: &Fit, doubt: Option<String>) -> Option<Found> {
-        let Hypothesis { nuisances, effects } = &fit.hypothesis;
+        let Hypothesis { nuisances, mut effects } = fit.hypothesis.clone();
+        // The closure term is the last effect, and `study` does not have it.
+        effects.retain(|(index, _)| *index < study.effects.len());
+        let size = nuisances.len() + effects.iter().map(|(_, values)| values.len()).sum::<usize>();
         let covariance = fit.precision.clone().cholesky()?.inverse();
+        let covariance = covariance.view((0, 0), (size, size));
         let tolerance = |(nuisance, sigmas): (&Nuisance, &f64)| FoundTolerance {
             name: nuisance.kind.to_string(),
             value: nuisance.value(*sigmas),
             sigma: nuisance.sigma,
         };
-        let ids = infos(&study.effects, &fit.hypothesis).map(|info| info.id.to_string());
-        let effects =
-            ids.zip(effects).map(|(id, (_, values))| FoundEffect { id, values: values.clone() }).collect();
+        let found = |(index, values): (usize, Vec<f64>)| FoundEffect {
+            id: study.effects[index].info().id.to_string(),
+            values,
+        };
         Some(Found {
-            effects,
-            tolerances: study.nuisances.iter().zip(nuisances).map(tolerance).collect(),
+            effects: effects.into_iter().map(found).collect(),
+            tolerances: study.nuisances.iter().zip(&nuisances).map(tolerance).collect(),
             covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
             doubt,
         })

@@ -184,7 +184,7 @@ impl Diagnosed {
     fn imitation(&self) -> Option<(f64, &CauseFit)> {
         let Diagnosed { diagnosis, fits, .. } = self;
         let term = diagnosis.closure_terms.first().filter(|_| diagnosis.is_outside_without_closure())?;
-        Some((diagnosis.probability_outside * term.gap_reduction, &fits.closures.first()?.fit))
+        Some((diagnosis.probability_outside * term.gap_reduction, fits.closure.as_ref()?))
     }
 
     /// What uncorrected causes add to a point: weighted squared changes by their corrections, and T2's residual without a closure term.
@@ -209,20 +209,13 @@ impl Diagnosed {
         }
     }
 
-    /// The probable closure term with those not distinguished from it; else the causes that together reach [`CorrectedMap::NEEDED_PROBABILITY`].
+    /// The causes that together reach [`CorrectedMap::NEEDED_PROBABILITY`].
     fn open_causes(&self) -> OpenCauses<'_> {
         let Diagnosed { diagnosis, fits, .. } = self;
-        if let Some(term) = diagnosis.probable_closure_term().filter(|_| !fits.closures.is_empty()) {
-            let sentences = std::iter::once(&term.sentence).chain(&term.equivalent);
-            return OpenCauses {
-                causes: sentences.map(|sentence| Candidate::of_closure(term, sentence)).collect(),
-                fits: fits.closures.iter().map(|closure| &closure.fit).collect(),
-                probability: term.probability,
-                gap_reduction: term.gap_reduction,
-            };
-        }
-        let mut open = OpenCauses { gap_reduction: 1.0, ..OpenCauses::default() };
-        if !diagnosis.verdict.names_a_cause() {
+        let closure = diagnosis.probable_closure_term();
+        let gap_reduction = closure.map_or(1.0, |term| term.gap_reduction);
+        let mut open = OpenCauses { gap_reduction, ..OpenCauses::default() };
+        if closure.is_none() && !diagnosis.verdict.names_a_cause() {
             return open;
         }
         for (candidate, fit) in diagnosis.candidates.iter().zip(&fits.causes) {

@@ -1,21 +1,22 @@
 //! The diagnosis of one recording, stage by stage; `docs/explanation/gap.md` explains each.
 
-use crate::closure::discover::{Discovered, discover};
+use crate::closure::discover::{Discovered, Proposed, discover};
+use crate::closure::select::ClosureKey;
 use crate::drift::DriftReport;
 use crate::gap::baseline::Baseline;
 use crate::gap::best_fit::fit::Fit;
-use crate::gap::best_fit::fitted_causes::{CauseFit, ClosureFit, Fits, map_effect};
+use crate::gap::best_fit::fitted_causes::{CauseFit, Fits, map_effect};
 use crate::gap::calibrated_model::Found;
 use crate::gap::causes::additions::Calibration;
 use crate::gap::causes::probabilities::{Posterior, rivals, smallest_seen, suspicions, weight};
 use crate::gap::experiment::{Experiment, GapWarning};
 use crate::gap::gap_reduction::{Compared, beyond_prior, held_out_gap};
-use crate::gap::library_fits::{Explained, LibraryFits, explained};
+use crate::gap::library_fits::{LibraryFits, explained};
 use crate::gap::next_experiment::{Suggested, next, sensor_near};
 use crate::gap::preconditions::{
     GapError, Prepared, Problem, Zeroed, another_machine, assumed, checked_study, is_of_sensors,
 };
-use crate::gap::report::{Diagnosis, Gap, Next, Place, Verdict};
+use crate::gap::report::{Candidate, Diagnosis, Gap, Next, Place, Verdict};
 use crate::gap::request::{BaselineRecording, ClosureSearch, GapRequest, RigRecording};
 use crate::gap::residuals::study::{Hypothesis, Prediction, Study, members};
 use crate::gap::residuals::whiten::Linearised;
@@ -66,16 +67,17 @@ impl Diagnosed {
             let residual = linearised.residual(study, &prediction);
             Ok((prediction, residual))
         };
-        let settled = diagnosis.probable_closure_term().and(fits.closures.first());
-        let closure = settled.map(|closure| ("the closure term", &closure.fit));
-        let first = fits.causes.first().map(|cause| ("the most probable cause", cause));
-        let with = closure.or(first).filter(|_| diagnosis.verdict != Verdict::WithinTolerance);
-        let named = with.filter(|_| closure.is_some() || diagnosis.verdict != Verdict::Unexplained);
-        let tolerances = named.map_or(&fits.null, |(_, fit)| fit).hypothesis.nuisances.clone();
+        let first = diagnosis.candidates.first().zip(fits.causes.first());
+        let with = first.filter(|_| diagnosis.verdict != Verdict::WithinTolerance).map(|(candidate, fit)| {
+            let closure = candidate.has_closure();
+            (if closure { "the closure term" } else { "the most probable cause" }, fit, closure)
+        });
+        let named = with.filter(|(.., closure)| *closure || diagnosis.verdict != Verdict::Unexplained);
+        let tolerances = named.map_or(&fits.null, |(_, fit, _)| fit).hypothesis.nuisances.clone();
         Ok(Evidence {
             without_cause: read(&Hypothesis { nuisances: tolerances, effects: Vec::new() })?,
             with_cause: with
-                .map(|(name, fit)| {
+                .map(|(name, fit, _)| {
                     read(&fit.hypothesis).map(|(prediction, residual)| (name, prediction, residual))
                 })
                 .transpose()?,
@@ -111,11 +113,20 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     let gap = gap_on_held_out_steps(&library, &posterior, &calibration);
     let explained = explained(&library, &posterior, &gap);
     let verdict = verdict(explained, posterior.probabilities.unmodelled, prepared.drift.as_ref());
-    let closure = closure_terms(&library, explained, request.closure_search, &calibration, &beyond);
+    let mut closure = closure_terms(&library, explained, request.closure_search, &calibration, &beyond);
     // A change with time cannot be expressed as a closure term.
-    let closure = if prepared.drift.is_some() { closure.without_terms() } else { closure };
+    if prepared.drift.is_some() {
+        closure.proposed = None;
+    }
+    let settled = closure.proposed.as_ref();
+    let settled = settled.filter(|found| is_open(verdict) && found.closure_term.probability > 0.5);
+    let verdict = match settled {
+        Some(found) if found.closure_term.beside.is_empty() => Verdict::Unexplained,
+        Some(_) => Verdict::PartlyExplained,
+        None => verdict,
+    };
     let is_outside_tolerance = verdict != Verdict::WithinTolerance;
-    let has_closure = closure.is_settled();
+    let has_closure = settled.is_some();
     let locations = match closure.places {
         _ if !is_outside_tolerance => Vec::new(),
         Some(places) => places,
@@ -129,16 +140,19 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         Verdict::WithinTolerance => smallest_seen(&library.study, &library.linearised, &calibration),
         _ => Vec::new(),
     };
+    let with_closure = settled.and_then(|proposed| Some((&proposed.study, &proposed.causes.first()?.1)));
+    let best = with_closure.map(|(_, fit)| fit).or(library.fits.first());
     let named = library.fits.first().filter(|_| posterior.probabilities.named);
+    let (study, named) = with_closure.unwrap_or((&library.study, named.unwrap_or(&library.null)));
     let diagnosis = Diagnosis {
         verdict,
         baseline,
         locations,
-        suspects: beyond_prior(&library.study, library.at_best(), named.unwrap_or(&library.null)),
+        suspects: beyond_prior(study, library.at_best(), named),
         inseparable: inseparable(&library, &posterior),
-        closure_terms: closure.closure_terms,
+        closure_terms: closure.proposed.iter().map(|proposed| proposed.closure_term.clone()).collect(),
         closure_terms_by_balance: if is_outside_tolerance { closure.residual_sources } else { Vec::new() },
-        gap,
+        gap: settled.map_or(gap, |proposed| proposed.gap.clone()),
         map_effect: None,
         lists_all: false,
         next,
@@ -147,26 +161,27 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
         offsets_at_rest: prepared.zeroed.offsets_at_rest,
         assumed: if rig.tolerances_declared { Vec::new() } else { assumed(&library.study) },
         warnings: all_warnings(&prepared.drift, warnings, request.warnings, prepared.rejected_drift),
-        candidates: posterior.candidates,
-        probability_none: posterior.probabilities.none,
-        probability_unlisted: posterior.probabilities.unlisted,
-        probability_outside: posterior.probabilities.unmodelled,
+        candidates: match settled {
+            Some(proposed) => proposed.causes.iter().map(|(candidate, ..)| candidate.clone()).collect(),
+            None => posterior.candidates,
+        },
+        probability_none: settled.map_or(posterior.probabilities.none, |proposed| proposed.none),
+        probability_unlisted: if has_closure { 0.0 } else { posterior.probabilities.unlisted },
+        probability_outside: settled.map_or(posterior.probabilities.unmodelled, Proposed::outside),
     };
-    let best = library.fits.first().filter(|_| verdict.names_a_cause()).unwrap_or(&library.null);
+    let best = best.filter(|_| has_closure || verdict.names_a_cause()).unwrap_or(&library.null);
     let found = Found::of(&library.study, best, diagnosis.doubt());
-    let mut study = library.study.clone();
-    let closures = closure.fits.into_iter().filter_map(|(key, effect, fit)| {
-        let mut fit = CauseFit::of(&fit);
-        let own = fit.hypothesis.effects.iter_mut().find(|(index, _)| *index == effect)?;
-        own.0 = key.add_to(&mut study)?;
-        Some(ClosureFit { key, fit })
-    });
-    let causes = posterior.probabilities.causes.iter().map(|cause| CauseFit::of(&library.fits[cause.set]));
-    let fits =
-        Fits { null: CauseFit::of(&library.null), causes: causes.collect(), closures: closures.collect() };
-    let settled = diagnosis.probable_closure_term().and(fits.closures.first());
-    let cause =
-        settled.map(|closure| &closure.fit).or(fits.causes.first().filter(|_| verdict.names_a_cause()));
+    let fit_of = |(_, fit, key): &(Candidate, Fit, Option<ClosureKey>)| CauseFit::of(fit, key.as_ref());
+    let mut proposed = closure.proposed.iter().flat_map(|proposed| &proposed.causes);
+    let with_closure = proposed.find(|(candidate, ..)| candidate.has_closure()).map(fit_of);
+    let of_library = posterior.probabilities.causes.iter().map(|cause| &library.fits[cause.set]);
+    let causes = match settled {
+        Some(proposed) => proposed.causes.iter().map(fit_of).collect(),
+        None => of_library.map(|fit| CauseFit::of(fit, None)).collect(),
+    };
+    let study = closure.proposed.map_or_else(|| library.study.clone(), |proposed| proposed.study);
+    let fits = Fits { null: CauseFit::of(&library.null, None), causes, closure: with_closure };
+    let cause = fits.causes.first().filter(|_| has_closure || verdict.names_a_cause());
     let Zeroed { recording, zero, .. } = prepared.zeroed;
     let map_effect = cause.and_then(|cause| map_effect(&study, cause, &recording, &rig.identification));
     let diagnosis = Diagnosis { map_effect, ..diagnosis };
@@ -230,17 +245,17 @@ fn gap_on_held_out_steps(library: &LibraryFits, posterior: &Posterior, calibrati
 
 fn closure_terms(
     library: &LibraryFits,
-    explained: Explained,
+    explained: Verdict,
     search: ClosureSearch,
     calibration: &Calibration,
     progress: &(dyn Fn(f64, &str) + Sync),
 ) -> Discovered {
     let is_wanted = match search {
         ClosureSearch::Always => true,
-        ClosureSearch::IfUnexplained => matches!(explained, Explained::Most | Explained::Little),
+        ClosureSearch::IfUnexplained => is_open(explained),
         ClosureSearch::Never => false,
     };
-    if is_wanted { discover(library, explained, calibration, progress) } else { Discovered::default() }
+    if is_wanted { discover(library, calibration, progress) } else { Discovered::default() }
 }
 
 /// What the choice of the next experiment depends on.
@@ -311,17 +326,20 @@ fn inseparable(library: &LibraryFits, posterior: &Posterior) -> Vec<String> {
 const SURELY_OUTSIDE: f64 = 0.9;
 
 /// The verdict. No cause is named for a machine that drifts.
-fn verdict(explained: Explained, probability_outside: f64, drift: Option<&DriftReport>) -> Verdict {
+fn verdict(explained: Verdict, probability_outside: f64, drift: Option<&DriftReport>) -> Verdict {
     let sensors_drift = drift.is_some_and(is_of_sensors);
-    let machine_drifts = drift.is_some() && !sensors_drift;
     match explained {
-        Explained::NothingToExplain => Verdict::WithinTolerance,
-        Explained::All | Explained::Most if machine_drifts => Verdict::Unexplained,
-        Explained::All => Verdict::Explained,
-        Explained::Most => Verdict::PartlyExplained,
-        Explained::Little if sensors_drift && probability_outside < SURELY_OUTSIDE => {
+        Verdict::Explained | Verdict::PartlyExplained if drift.is_some() && !sensors_drift => {
+            Verdict::Unexplained
+        }
+        Verdict::Unexplained if sensors_drift && probability_outside < SURELY_OUTSIDE => {
             Verdict::WithinTolerance
         }
-        Explained::Little => Verdict::Unexplained,
+        explained => explained,
     }
+}
+
+/// Whether the effect library leaves a gap.
+fn is_open(verdict: Verdict) -> bool {
+    matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained)
 }

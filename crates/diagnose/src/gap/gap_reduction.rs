@@ -267,17 +267,6 @@ fn predict_held_out(compared: Compared<'_>, folds: &Folds) -> (Predicted, Predic
     (before, after)
 }
 
-/// Channel residuals on some steps for each prediction, and the channels that the last prediction makes worse than the one before it.
-pub(crate) fn channels_on(
-    study: &Study,
-    linearised: &Linearised,
-    [before, after]: [&Fit; 2],
-    steps: &[usize],
-) -> (BTreeMap<String, ChannelGap>, Vec<String>) {
-    let nominal = Predicted::nominal(study, linearised);
-    by_channel(study, [&nominal, &Predicted::of(before), &Predicted::of(after)], steps)
-}
-
 /// A channel is worse if its residual grows by this ratio, and by more than chance. Bound: a tenth of a residual is not seen on a plot.
 const WORSE_RATIO: f64 = 1.1;
 

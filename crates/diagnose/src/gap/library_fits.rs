@@ -10,7 +10,7 @@ use crate::gap::causes::select::{
 };
 use crate::gap::gap_reduction::Folds;
 use crate::gap::preconditions::GapError;
-use crate::gap::report::{Gap, MAX_REFITTED, Place};
+use crate::gap::report::{Gap, MAX_REFITTED, Place, Verdict};
 use crate::gap::residuals::study::{Study, members};
 use crate::gap::residuals::whiten::Linearised;
 
@@ -103,6 +103,13 @@ impl LibraryFits {
         self.fits.first().unwrap_or(&self.null)
     }
 
+    /// The causes beside which a closure term is tried: the best one, and the best single effect, because several imitate what is outside.
+    pub(crate) fn bases(&self) -> impl Iterator<Item = &Fit> {
+        let single = |fit: &&Fit| fit.hypothesis.effects.len() == 1;
+        let best = self.fits.first().filter(|best| !single(best));
+        best.into_iter().chain(self.fits.iter().chain(&self.searched).find(single))
+    }
+
     pub(crate) fn at_best(&self) -> &Linearised {
         self.at_best.as_ref().unwrap_or(&self.linearised)
     }
@@ -146,26 +153,13 @@ fn compared_at_best(at_best: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
     ranked(at_best, again.iter().chain(closest).chain(others))
 }
 
-/// How much of the gap the effect library explains.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Explained {
-    /// There is no gap beyond tolerance.
-    NothingToExplain,
-    /// A cause leaves only noise.
-    All,
-    /// A cause removes most of the gap.
-    Most,
-    /// No cause removes most of the gap.
-    Little,
-}
-
 /// How much of the gap the library explains. A named cause with a probable cause outside the library explains most of it if it removes at least
 /// [`MIN_GAP_REDUCTION`] of the misfit, of its smooth part, and of the gap on held-out steps.
-pub(crate) fn explained(library: &LibraryFits, posterior: &Posterior, gap: &Gap) -> Explained {
+pub(crate) fn explained(library: &LibraryFits, posterior: &Posterior, gap: &Gap) -> Verdict {
     match (posterior.probabilities.named, posterior.probabilities.unmodelled > 0.5) {
-        (false, false) => return Explained::NothingToExplain,
-        (false, true) => return Explained::Little,
-        (true, false) => return Explained::All,
+        (false, false) => return Verdict::WithinTolerance,
+        (false, true) => return Verdict::Unexplained,
+        (true, false) => return Verdict::Explained,
         (true, true) => {}
     }
     let (null, best) = (&library.null, library.best());
@@ -176,5 +170,5 @@ pub(crate) fn explained(library: &LibraryFits, posterior: &Posterior, gap: &Gap)
             .map(|adequacy| adequacy.smooth_excess);
     let smooth = 1.0 - smooth_after.max(0.0) / smooth_before.max(1.0);
     let removes_most = [removed, smooth, gap.gap_reduction].iter().all(|share| *share > MIN_GAP_REDUCTION);
-    if removes_most { Explained::Most } else { Explained::Little }
+    if removes_most { Verdict::PartlyExplained } else { Verdict::Unexplained }
 }

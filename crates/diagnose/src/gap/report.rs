@@ -50,7 +50,7 @@ pub struct Diagnosis {
     pub probability_none: f64,
     /// Probability of causes of the effect library that are not among the candidates.
     pub probability_unlisted: f64,
-    /// Probability that the cause is not in the effect library.
+    /// Probability of a cause outside the effect library, alone or with effects of it; candidates with a closure term are included.
     pub probability_outside: f64,
     /// Closure terms for the gap that the effect library does not explain, best first; empty if none is proposed.
     pub closure_terms: Vec<ClosureTerm>,
@@ -156,20 +156,12 @@ pub struct ClosureTerm {
     pub terms: Vec<ClosureCoefficient>,
     /// Probability of this term among all terms tried and none.
     pub probability: f64,
-    /// Share of the gap removed on steps used neither to find nor to fit the term; 0 if any channel gets worse.
+    /// Share of the gap removed on held-out steps, where no channel gets worse.
     pub gap_reduction: f64,
     /// Number of these held-out steps.
     pub held_out_steps: usize,
-    /// Gap of each channel on these steps.
-    pub channels: BTreeMap<String, ChannelGap>,
-    /// Channels that get worse on these steps.
-    pub worse: Vec<String>,
     /// Library effects fitted together with the term; empty if it was found alone.
     pub beside: Vec<String>,
-    /// These effects with their sizes.
-    pub beside_cause: Option<Candidate>,
-    /// Share of the leave-one-out folds of steps that select the same part and this term or an equivalent.
-    pub stability: f64,
     /// Closure terms that the recording cannot distinguish from this one, as sentences.
     pub equivalent: Vec<String>,
     /// Name of the effect file written for it.
@@ -215,6 +207,9 @@ pub struct Candidate {
     pub names: Vec<String>,
     /// Calibrated probability of these effects, with or without others too weak to detect.
     pub probability: f64,
+    /// Probability of each effect, whatever the others.
+    #[serde(default)]
+    pub each: Vec<f64>,
     /// Parameters; `inner_node.phi` if an effect has several.
     pub parameters: BTreeMap<String, Estimate>,
     /// Onsets of effects that begin with a step, by id.
@@ -227,12 +222,22 @@ impl Candidate {
     /// Id of a closure term among the effects of a cause.
     pub const CLOSURE: &str = "closure_term";
 
-    /// A closure term as a cause, with the effects fitted beside it.
-    pub(crate) fn of_closure(term: &ClosureTerm, sentence: &str) -> Candidate {
-        let mut cause = term.beside_cause.clone().unwrap_or_default();
-        cause.effects.push(Candidate::CLOSURE.to_owned());
-        cause.names.push(sentence.to_owned());
-        Candidate { probability: term.probability, ..cause }
+    /// The same with a closure term as one more member.
+    pub(crate) fn with_closure(mut self, sentence: &str, probability: f64) -> Candidate {
+        self.effects.push(Candidate::CLOSURE.to_owned());
+        self.names.push(sentence.to_owned());
+        self.each.push(probability);
+        self
+    }
+
+    /// Whether a closure term is a member.
+    pub fn has_closure(&self) -> bool {
+        self.effects.last().is_some_and(|effect| effect == Candidate::CLOSURE)
+    }
+
+    /// The sentence of its closure term.
+    pub(crate) fn closure(&self) -> Option<&String> {
+        self.names.last().filter(|_| self.has_closure())
     }
 }
 
@@ -491,13 +496,14 @@ pub(crate) const MAX_REFITTED: usize = 7;
 pub(crate) const MAX_EQUIVALENT: usize = 2;
 
 impl Diagnosis {
-    /// Causes to list: the first, and others that are not improbable.
+    /// Causes to list: the first if it explains the gap, and others that are not improbable.
     pub fn listed(&self) -> impl Iterator<Item = &Candidate> {
-        self.candidates
-            .iter()
-            .enumerate()
-            .filter(|(place, c)| *place == 0 || self.lists_all || c.probability >= LISTED)
-            .map(|(_, c)| c)
+        let explains = |place| place == 0 && self.verdict == Verdict::Explained;
+        let candidates = self.candidates.iter().enumerate();
+        let listed = move |(place, c): &(usize, &Candidate)| {
+            explains(*place) || self.lists_all || c.probability >= LISTED
+        };
+        candidates.filter(listed).map(|(_, c)| c)
     }
 
     /// The closure term that is more probable than not; `None` if there is none.

@@ -2,7 +2,7 @@
 
 use crate::closure::select::ClosureKey;
 use crate::drift::DriftReport;
-use crate::gap::best_fit::fitted_causes::{CauseFit, ClosureFit, Fits};
+use crate::gap::best_fit::fitted_causes::{CauseFit, Fits};
 use crate::gap::calibrated_model::Found;
 use crate::gap::diagnose::Diagnosed;
 use crate::gap::preconditions::{GapError, Zeroed};
@@ -23,7 +23,7 @@ pub struct StoredFits {
     null: StoredFit,
     /// All candidates, also those that are not listed.
     causes: Vec<(Candidate, StoredFit)>,
-    closures: Vec<StoredFit>,
+    closure: Option<StoredFit>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -69,19 +69,16 @@ pub enum RestoreError {
 impl Diagnosed {
     /// The fits for a file.
     pub fn stored(&self) -> StoredFits {
-        let Fits { null, causes, closures } = &self.fits;
-        let stored = |fit: &CauseFit| self.stored_fit(fit, None);
+        let Fits { null, causes, closure } = &self.fits;
+        let stored = |fit: &CauseFit| self.stored_fit(fit);
         StoredFits {
             null: stored(null),
             causes: self.diagnosis.candidates.iter().cloned().zip(causes.iter().map(stored)).collect(),
-            closures: closures
-                .iter()
-                .map(|closure| self.stored_fit(&closure.fit, Some(&closure.key)))
-                .collect(),
+            closure: closure.as_ref().map(stored),
         }
     }
 
-    fn stored_fit(&self, fit: &CauseFit, closure: Option<&ClosureKey>) -> StoredFit {
+    fn stored_fit(&self, fit: &CauseFit) -> StoredFit {
         let study = &self.study;
         let last = fit.hypothesis.effects.len().saturating_sub(1);
         let effect = |(place, (index, values)): (usize, &(usize, Vec<f64>))| {
@@ -91,7 +88,7 @@ impl Diagnosed {
                 begins: onset_step(history),
                 grows: matches!(history.shape, Shape::Ramp(_)),
             };
-            let key = closure.filter(|_| place == last);
+            let key = fit.closure.as_ref().filter(|_| place == last);
             let cause = key.map_or_else(of_library, |key| StoredCause::Closure(key.clone()));
             StoredEffect { cause, values: values.clone() }
         };
@@ -112,7 +109,7 @@ impl Diagnosed {
     ) -> Result<Diagnosed, RestoreError> {
         let zeroed = Zeroed::new(rig, drift.as_ref());
         let mut study = zeroed.study(rig, effects)?;
-        let all = || stored.causes.iter().map(|(_, fit)| fit).chain(&stored.closures);
+        let all = || stored.causes.iter().map(|(_, fit)| fit).chain(&stored.closure);
         let is_late = |one: &StoredEffect| matches!(one.cause, StoredCause::Effect { begins: Some(_), .. });
         if all().any(|fit| fit.effects.iter().any(is_late)) {
             study.add_onsets();
@@ -120,13 +117,7 @@ impl Diagnosed {
         let mut fit = |stored: &StoredFit| stored.restored(&mut study);
         let null = fit(&stored.null)?;
         let causes = stored.causes.iter().map(|(_, stored)| fit(stored)).collect::<Result<_, _>>()?;
-        let closures = stored.closures.iter().map(|stored| {
-            let Some(StoredCause::Closure(key)) = stored.effects.last().map(|last| &last.cause) else {
-                return Err(RestoreError::Other);
-            };
-            Ok(ClosureFit { key: key.clone(), fit: fit(stored)? })
-        });
-        let closures = closures.collect::<Result<_, _>>()?;
+        let closure = stored.closure.as_ref().map(fit).transpose()?;
         let candidates = stored.causes.into_iter().map(|(candidate, _)| candidate).collect();
         Ok(Diagnosed {
             diagnosis: Diagnosis { candidates, ..diagnosis },
@@ -134,7 +125,7 @@ impl Diagnosed {
             zero: zeroed.zero,
             found,
             study,
-            fits: Fits { null, causes, closures },
+            fits: Fits { null, causes, closure },
             library: None,
         })
     }
@@ -174,6 +165,11 @@ impl StoredFit {
             return Err(RestoreError::Other);
         }
         let covariance = self.covariance.as_ref().map(|rows| DMatrix::from_fn(n, n, |i, j| rows[i][j]));
-        Ok(CauseFit { hypothesis: Hypothesis { nuisances: self.tolerances.clone(), effects }, covariance })
+        let closure = match self.effects.last() {
+            Some(StoredEffect { cause: StoredCause::Closure(key), .. }) => Some(key.clone()),
+            _ => None,
+        };
+        let hypothesis = Hypothesis { nuisances: self.tolerances.clone(), effects };
+        Ok(CauseFit { hypothesis, covariance, closure })
     }
 }

@@ -4,7 +4,7 @@
 //! the time. Such a channel counts as frozen only if it stays constant over a jump that should move it.
 
 use crate::IdentifyConfig;
-use crate::needs::needs;
+use crate::config::needs;
 use crate::reading_checks::ends::{Ends, FailedCheck};
 use crate::step_data::samples::{FOLLOWED_S, LONGEST_BRIDGE_S};
 use mapper_core::{Channel, Recording, Series, Warning, check_running, is_jump, repeats};

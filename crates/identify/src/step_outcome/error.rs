@@ -1,6 +1,6 @@
 //! Errors that stop identification altogether, and reasons why a single step gives no point.
 
-use crate::needs::names;
+use crate::config::names;
 use mapper_core::{Channel, Method, step_number};
 
 /// Why a recording cannot be identified.

@@ -6,10 +6,9 @@ use crate::document::{Cell, Describe, Document, Table};
 use crate::formatting::{Message, display_scale, four_figures};
 use mapper_core::{Channel, probability_text, step_number, valve_area_text, with_unit};
 use mapper_diagnose::gap::{
-    Baseline, BeyondPrior, Candidate, ChannelGap, ClosureTerm, Diagnosed, Diagnosis, Estimate, Evidence, Gap,
-    MapEffect, PointGap, SmallestSeen, Verdict,
+    Baseline, BeyondPrior, Candidate, ClosureTerm, Diagnosed, Diagnosis, Estimate, Evidence, Gap, MapEffect,
+    PointGap, SmallestSeen, Verdict,
 };
-use std::collections::BTreeMap;
 
 /// Maximum number of causes shown.
 const CAUSES: usize = 8;
@@ -94,13 +93,15 @@ fn causes(diagnosis: &Diagnosis) -> Document {
     });
     let listed: f64 = diagnosis.listed().map(|candidate| candidate.probability).sum();
     let all: f64 = diagnosis.candidates.iter().map(|candidate| candidate.probability).sum();
+    let with_closure = diagnosis.candidates.iter().filter(|candidate| candidate.has_closure());
+    let unmodelled = diagnosis.probability_outside - with_closure.map(|one| one.probability).sum::<f64>();
     let improbable = Some((all - listed, IMPROBABLE.to_owned())).filter(|(sum, _)| *sum > SHOWN);
     let mut rows: Vec<(f64, String)> = candidate_rows
         .chain(improbable)
         .chain([
             (diagnosis.probability_none, NOTHING.to_owned()),
             (diagnosis.probability_unlisted, UNLISTED.to_owned()),
-            (diagnosis.probability_outside, OUTSIDE.to_owned()),
+            (unmodelled.max(0.0), OUTSIDE.to_owned()),
         ])
         .collect();
     rows.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -245,10 +246,7 @@ fn add_closure_terms(document: &mut Document, diagnosis: &Diagnosis) {
 }
 
 fn describe_removed_residual(term: &ClosureTerm) -> String {
-    match term.worse.as_slice() {
-        [] => format!("removes {:.0} % of the gap", 100.0 * term.gap_reduction),
-        worse => format!("the gap does not shrink: {} gets worse", worse.join(", ")),
-    }
+    format!("removes {:.0} % of the gap", 100.0 * term.gap_reduction)
 }
 
 /// The most probable answer, and what it does to the map.
@@ -312,10 +310,13 @@ fn answer(diagnosis: &Diagnosis) -> String {
                 "{OUTSIDE} is the most probable{suffix} ({})",
                 probability_text(diagnosis.probability_outside)
             );
-            let Some(term) = diagnosis.probable_closure_term() else { return outside };
-            let beside =
-                term.beside_cause.as_ref().map(|beside| format!(", together with {}", cause(beside)));
-            format!("{outside}: {}{}", term.sentence, beside.unwrap_or_default())
+            match first.filter(|first| first.has_closure()) {
+                Some(first) if first.effects.len() > 1 => {
+                    format!("{} explain the gap{suffix}", members(first))
+                }
+                Some(first) => format!("{outside}: {}", members(first)),
+                None => outside,
+            }
         }
     }
 }
@@ -376,15 +377,35 @@ pub(crate) fn part_name(submodel: &str) -> String {
 }
 
 fn nearest(diagnosis: &Diagnosis) -> Option<String> {
-    let first = diagnosis.candidates.first()?;
-    match diagnosis.verdict {
-        Verdict::PartlyExplained => Some(format!(
+    let first = diagnosis.listed().next();
+    if first.is_some_and(Candidate::has_closure) {
+        return None;
+    }
+    match (diagnosis.verdict, first) {
+        (Verdict::PartlyExplained, Some(first)) => Some(format!(
             "nearest in the effect library: {}, whose residual exceeds the declared tolerances",
             candidate_name(first)
         )),
-        Verdict::Unexplained => Some("no effect of the library comes near".to_owned()),
-        Verdict::WithinTolerance | Verdict::Explained => None,
+        (Verdict::PartlyExplained | Verdict::Unexplained, _) => {
+            Some("no effect of the library comes near".to_owned())
+        }
+        (Verdict::WithinTolerance | Verdict::Explained, _) => None,
     }
+}
+
+/// Each member with its sizes and its own probability.
+fn members(candidate: &Candidate) -> String {
+    let member = |((id, name), probability): ((&String, &String), &f64)| {
+        let probability = probability_text(*probability);
+        if id == Candidate::CLOSURE {
+            return format!("{name} (closure term, {probability})");
+        }
+        let own = candidate.parameters.iter().filter(|(key, _)| key.split('.').next() == Some(id));
+        let sizes: Vec<&str> = own.map(|(_, estimate)| estimate.size.as_str()).collect();
+        format!("{name} ({id}) {} ({probability})", sizes.join(", "))
+    };
+    let ids = candidate.effects.iter().zip(&candidate.names);
+    ids.zip(&candidate.each).map(member).collect::<Vec<_>>().join(" and ")
 }
 
 fn candidate_name(candidate: &Candidate) -> String {
@@ -436,19 +457,8 @@ fn describe_support(gap: &Gap) -> String {
 fn add_gap_reduction(document: &mut Document, diagnosis: &Diagnosis) {
     let gap = &diagnosis.gap;
     let mut body = Document::default();
-    if let Some(term) = diagnosis.probable_closure_term() {
-        let steps: usize = gap.folds.iter().map(Vec::len).sum();
-        let basis = match term.held_out_steps {
-            0 => "on the fitted steps; there are too few to hold any out".to_owned(),
-            held => {
-                format!("on {held} of {steps} steps, used neither to find the closure term nor to fit it")
-            }
-        };
-        body.text(describe_removed_residual(term));
-        body.table(by_channel(diagnosis, &term.channels, "with the term", 3));
-        return document.section(format!("Gap reduction, {basis}"), body);
-    }
-    let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
+    let closure = diagnosis.probable_closure_term().is_some();
+    let named = closure || diagnosis.verdict.names_a_cause();
     let basis = match gap.folds.len() {
         0 | 1 => "on the fitted steps; there are too few to hold any out".to_owned(),
         folds => format!("on {} held-out steps ({folds}-fold cross-validation)", gap.held_out_steps.len()),
@@ -469,7 +479,7 @@ fn add_gap_reduction(document: &mut Document, diagnosis: &Diagnosis) {
     } else if !gap.worse.is_empty() {
         body.text(format!("the gap does not shrink: {} gets worse", gap.worse.join(", ")));
     }
-    body.table(by_channel(diagnosis, &gap.channels, "with the cause", if named { 3 } else { 2 }));
+    body.table(by_channel(diagnosis, if named { 3 } else { 2 }));
     body.text(describe_affected_points(diagnosis).unwrap_or_default());
     if named {
         body.text(describe_strained_tolerance(gap).unwrap_or_default());
@@ -503,18 +513,13 @@ fn describe_strained_tolerance(gap: &Gap) -> Option<String> {
 }
 
 /// The rms residual of each channel in the first so many columns.
-fn by_channel(
-    diagnosis: &Diagnosis,
-    channels: &BTreeMap<String, ChannelGap>,
-    with: &str,
-    columns: usize,
-) -> Table {
+fn by_channel(diagnosis: &Diagnosis, columns: usize) -> Table {
     let bare = if diagnosis.baseline.is_some() { "baseline" } else { "nominal" };
     let heads = ["rms residual", "unit"]
         .into_iter()
-        .chain([bare, "tolerances fitted", with].into_iter().take(columns));
+        .chain([bare, "tolerances fitted", "with the cause"].into_iter().take(columns));
     let mut table = Table::new(heads).with_texts([1]);
-    for (channel, row) in channels {
+    for (channel, row) in &diagnosis.gap.channels {
         let (scale, unit) = display_scale(&row.unit);
         let values = [row.nominal, row.before, row.after].into_iter().take(columns);
         let values = values.map(|value| four_figures(scale * value));

@@ -75,7 +75,7 @@ fn find_action(table: &[(&str, &'static str)], name: &str) -> Option<&'static st
 /// Checks in order of the probability of their causes, each once; empty if the rig is as declared.
 pub(crate) fn stand_actions(diagnosis: &Diagnosis) -> Vec<String> {
     let mut actions: Vec<&str> = Vec::new();
-    let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
+    let named = diagnosis.verdict == Verdict::Explained;
     let open = diagnosis
         .candidates
         .iter()

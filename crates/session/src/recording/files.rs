@@ -55,8 +55,8 @@ pub(crate) fn write_files(
 }
 
 /// Version of the keys of all diagnoses (gap, drift, log without steps). Version 1 had no number, and `where`, `laws`, `off_at_rest`, `since` and
-/// `gap.shrink` for `locations`, `closure_terms`, `offsets_at_rest`, `baseline` and `gap.gap_reduction`.
-pub const DIAGNOSIS_FORMAT: u32 = 2;
+/// `gap.shrink` for `locations`, `closure_terms`, `offsets_at_rest`, `baseline` and `gap.gap_reduction`. In version 2 no candidate had a closure term.
+pub const DIAGNOSIS_FORMAT: u32 = 3;
 /// Version of the keys of a points file.
 pub(crate) const POINTS_FORMAT: u32 = 1;
 /// Version of the keys of a sealed forecast.

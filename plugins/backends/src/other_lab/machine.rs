@@ -192,8 +192,7 @@ pub(crate) fn evaluate(
     outputs.bearing_k = bearing_k;
     // Efficiency and pressure ratio are those between the stations of P1 and P2: the loss of the duct belongs to the compressor.
     let station_ratio = y[P_SECOND] / boundary.p1_pa;
-    outputs.efficiency *=
-        compression::isentropic_rise_ratio(station_ratio, boundary.t1_k, air) / rise_ratio;
+    outputs.efficiency *= compression::isentropic_rise_ratio(station_ratio, boundary.t1_k, air) / rise_ratio;
     outputs.radiation_w = housing::radiation_w(params.radiation_area_m2, y[TURBINE], outer_k[BACK_NODE]);
     let external_w: [f64; NODES] = std::array::from_fn(|node| {
         housing::external_heat_w(

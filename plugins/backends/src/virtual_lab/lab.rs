@@ -1,7 +1,7 @@
 //! The virtual gas stand: the lumped model behind actuators and sensors, in simulated time.
 
 use super::samples::{Instant, SampleCollector, SensorBank};
-use crate::setpoint_limits;
+use crate::ACCEPTED_SETPOINTS;
 use crate::virtual_lab::rig::actuator::Actuator;
 use crate::virtual_lab::rig::drift;
 use crate::virtual_lab::rig::drift::LabDrift;
@@ -98,7 +98,7 @@ impl Backend for VirtualLab {
             exclusive: self.settings.rig.clone(),
             reached_at: None,
             needs_guarded: vec![GuardName::Overspeed, GuardName::TurbineInletPressure],
-            accepts: Some(setpoint_limits::ACCEPTED),
+            accepts: Some(ACCEPTED_SETPOINTS),
             // Closing rate of a usual air supply.
             safe: SafeTrajectory { p3_slew_pa_s: Some(100e3), valve_opening_ratio: 1.0, within_s: 20.0 },
         }
@@ -163,7 +163,7 @@ impl Backend for VirtualLab {
     }
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
-        setpoint_limits::ACCEPTED.check(setpoints)?;
+        ACCEPTED_SETPOINTS.check(setpoints)?;
         let (settings, armed) = self.armed("set")?;
         armed.commands = Some(*setpoints);
         armed.requested_mode = if armed.tripped { RigMode::Standstill } else { setpoints.mode };

@@ -21,19 +21,16 @@ pub(crate) struct CauseFit {
     pub(crate) hypothesis: Hypothesis,
     /// Covariance of the effects' search coordinates; `None` if the recording does not determine them.
     pub(crate) covariance: Option<DMatrix<f64>>,
+    /// The closure term that is its last effect, if any.
+    pub(crate) closure: Option<ClosureKey>,
 }
 
 impl CauseFit {
-    pub(crate) fn of(fit: &Fit) -> CauseFit {
+    pub(crate) fn of(fit: &Fit, closure: Option<&ClosureKey>) -> CauseFit {
         let covariance = Some(&fit.covariance).filter(|all| all.iter().all(|one| one.is_finite()));
-        CauseFit { hypothesis: fit.hypothesis.clone(), covariance: covariance.cloned() }
+        let covariance = covariance.cloned();
+        CauseFit { hypothesis: fit.hypothesis.clone(), covariance, closure: closure.cloned() }
     }
-}
-
-#[derive(Debug, Clone)]
-pub(crate) struct ClosureFit {
-    pub(crate) key: ClosureKey,
-    pub(crate) fit: CauseFit,
 }
 
 /// The fits on which everything rests that follows from a diagnosis.
@@ -41,8 +38,8 @@ pub(crate) struct ClosureFit {
 pub(crate) struct Fits {
     pub(crate) null: CauseFit,
     pub(crate) causes: Vec<CauseFit>,
-    /// Those of the first closure term, and of those that the recording does not distinguish from it.
-    pub(crate) closures: Vec<ClosureFit>,
+    /// That of the closure term, also of one that is not probable.
+    pub(crate) closure: Option<CauseFit>,
 }
 
 #[derive(Debug, Clone, PartialEq)]

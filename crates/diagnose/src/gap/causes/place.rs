@@ -6,7 +6,7 @@
 
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::causes::additions::Calibration;
-use crate::gap::causes::probabilities::prior_of_number;
+use crate::gap::causes::probabilities::{prior, weight};
 use crate::gap::report::Place;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::prediction::PointState;
@@ -46,13 +46,12 @@ pub(crate) struct Explanation<'a> {
     pub parts: Vec<Part<'a>>,
 }
 
-pub(crate) fn rarity(calibration: &Calibration, study: &Study) -> f64 {
-    let prior = |effects: usize| prior_of_number(calibration, study.catalogue, effects);
-    prior(0) - prior(1)
-}
-
-/// Converts fits to explanations. `fits` are effects and combinations, best first; `rarity`: see [`rarity`].
-pub(crate) fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>], rarity: f64) -> Vec<Explanation<'a>> {
+/// Converts fits to explanations. `fits` are effects and combinations, best first.
+pub(crate) fn of_fits<'a>(
+    study: &'a Study,
+    fits: &'a [Gain<'_>],
+    calibration: &Calibration,
+) -> Vec<Explanation<'a>> {
     let explanation = |candidate: &'a Gain<'_>| {
         let all = members(&candidate.fit.hypothesis);
         let parts = all.iter().map(|effect| {
@@ -66,7 +65,9 @@ pub(crate) fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>], rarity: f64) -
             }
         });
         // Scores of fits to some steps and to all steps are not comparable; gains are.
-        Explanation { score: 0.5 * candidate.gain - rarity * all.len() as f64, parts: parts.collect() }
+        let rarity = prior(calibration, study, &candidate.fit.hypothesis);
+        let nothing = prior(calibration, study, &study.nothing());
+        Explanation { score: 0.5 * candidate.gain + rarity - nothing, parts: parts.collect() }
     };
     fits.iter().map(explanation).collect()
 }
@@ -87,15 +88,14 @@ pub(crate) fn places(
     fits: &[Gain<'_>],
     named: Option<usize>,
 ) -> Vec<Place> {
-    let rarity = rarity(calibration, study);
     let considered = named.map_or(fits, |causes| &fits[..fits.len().min(causes)]);
     // The other fits give each member's contribution.
-    let mut explanations = of_fits(study, fits, rarity);
+    let mut explanations = of_fits(study, fits, calibration);
     explanations.truncate(considered.len());
     if named.is_some() {
         // Fits to the same steps: their evidence is comparable.
         for (explanation, Gain { fit, .. }) in explanations.iter_mut().zip(considered) {
-            explanation.score = fit.score - rarity * fit.hypothesis.effects.len() as f64;
+            explanation.score = weight(calibration, study, fit);
         }
     }
     places_of(
@@ -139,7 +139,11 @@ pub(crate) fn places_of(
         }
     }
     parts.sort_by(|a, b| b.1.total_cmp(&a.1));
-    parts.retain(|(_, share, ..)| *share >= LINEARISATION_ERROR_RATIO);
+    // A fitted cause is where its members are, however small; other parts may be due to the linearisation.
+    let first = explanations.iter().zip(&weights).max_by(|a, b| a.1.total_cmp(b.1)).filter(|_| bend == 0.0);
+    let of_first: Vec<Submodel> =
+        first.iter().flat_map(|(explanation, _)| &explanation.parts).map(|part| part.submodel).collect();
+    parts.retain(|(part, share, ..)| *share >= LINEARISATION_ERROR_RATIO || of_first.contains(part));
     let points = study.points(&null.hypothesis).unwrap_or_default();
     let shown = parts.into_iter().filter_map(|(submodel, share, _, part)| {
         Some((submodel, share, show(study, linearised, &(part.signature)()?, &points)?))

@@ -34,12 +34,23 @@ const LATE_RATIO: f64 = 0.005;
 /// Minimum ratio of the numbers of sets of one effect more. Bound: avoids the logarithm of zero if a set has all effects.
 const MIN_SETS_RATIO: f64 = 0.1;
 
-/// Logarithm of a cause's prior: pairs are rarer and more numerous; causes that begin during the recording are rarer, with any step.
+/// Prior of all closure terms together. Judgement: one gap in seven is none of the library's effects and has a physical term.
+const PRIOR_CLOSURE: f64 = 0.15;
+
+/// Logarithm of a cause's prior: pairs are rarer and more numerous; causes that begin during the recording are rarer, with any step. A closure
+/// term counts as one more cause, chosen from its own library.
 pub(crate) fn prior(calibration: &Calibration, study: &Study, hypothesis: &Hypothesis) -> f64 {
-    let of_number = prior_of_number(calibration, study.catalogue, hypothesis.effects.len());
-    let late =
-        hypothesis.effects.iter().filter(|(index, _)| study.histories[*index] != TimeHistory::THROUGHOUT);
-    of_number + late.count() as f64 * (LATE_RATIO / (2.0 * study.steps.len().max(1) as f64)).ln()
+    let of_number = |effects: usize| prior_of_number(calibration, study.catalogue, effects);
+    let mut ln_prior = of_number(hypothesis.effects.len());
+    for (index, _) in &hypothesis.effects {
+        if study.histories[*index] != TimeHistory::THROUGHOUT {
+            ln_prior += (LATE_RATIO / (2.0 * study.steps.len().max(1) as f64)).ln();
+        }
+        if let Some(rarity) = study.rarities.get(index) {
+            ln_prior += PRIOR_CLOSURE.ln() - rarity - of_number(1);
+        }
+    }
+    ln_prior
 }
 
 /// Logarithm of the prior of one set of so many effects, of a library of `count`.
@@ -62,6 +73,14 @@ pub(crate) fn weight(calibration: &Calibration, study: &Study, fit: &Fit) -> f64
     fit.score + prior(calibration, study, &fit.hypothesis)
 }
 
+/// The set of a fit: its causes, without their onsets.
+pub(crate) fn cause_set(calibration: &Calibration, study: &Study, fit: &Fit) -> CauseSet {
+    CauseSet {
+        members: members(&fit.hypothesis).iter().map(|member| study.family(*member)).collect(),
+        ln_weight: weight(calibration, study, fit),
+    }
+}
+
 /// Probabilities of the causes of these fits, best first. An inadequate best fit supports a cause that is not in the library.
 pub(crate) fn posterior(
     study: &Study,
@@ -70,11 +89,7 @@ pub(crate) fn posterior(
     fits: &[Fit],
     adequacy: &Adequacy,
 ) -> Posterior {
-    let set = |fit: &Fit| CauseSet {
-        members: members(&fit.hypothesis).iter().map(|member| study.family(*member)).collect(),
-        ln_weight: weight(calibration, study, fit),
-    };
-    let sets: Vec<CauseSet> = fits.iter().map(set).collect();
+    let sets: Vec<CauseSet> = fits.iter().map(|fit| cause_set(calibration, study, fit)).collect();
     let unmodelled = calibration.outside(adequacy.features());
     let none = weight(calibration, study, null);
     let probabilities = calibration.rules().cause_probabilities(none, &sets, unmodelled);
@@ -85,17 +100,28 @@ pub(crate) fn posterior(
     let candidates = causes
         .iter()
         .enumerate()
-        .map(|(place, RankedCause { set, probability })| {
-            let (fit, covariance) = (&fits[*set], Some(&fits[*set].covariance));
+        .map(|(place, cause)| {
             let others = if place == 0 { alike.get(1..).unwrap_or_default() } else { &[] };
-            Candidate {
-                onsets: onsets(study, fit),
-                equivalent: others.iter().map(ids).collect(),
-                ..candidate(calibration, &study.effects, &fit.hypothesis, covariance, *probability)
-            }
+            let fitted = candidate_of(calibration, study, &fits[cause.set], (&probabilities, &sets, cause));
+            Candidate { equivalent: others.iter().map(ids).collect(), ..fitted }
         })
         .collect();
     Posterior { probabilities, candidates, alike }
+}
+
+/// A fit of library effects as a cause of a posterior of `sets`.
+pub(crate) fn candidate_of(
+    calibration: &Calibration,
+    study: &Study,
+    fit: &Fit,
+    (probabilities, sets, cause): (&CauseProbabilities, &[CauseSet], &RankedCause),
+) -> Candidate {
+    let of_effect = |(index, _): &(usize, _)| probabilities.of_member(sets, study.family(*index));
+    Candidate {
+        onsets: onsets(study, fit),
+        each: fit.hypothesis.effects.iter().map(of_effect).collect(),
+        ..candidate(calibration, &study.effects, &fit.hypothesis, Some(&fit.covariance), cause.probability)
+    }
 }
 
 pub(crate) fn candidate(
@@ -109,6 +135,7 @@ pub(crate) fn candidate(
         effects: ids(effects, hypothesis),
         names: infos(effects, hypothesis).map(|info| info.name.to_string()).collect(),
         probability,
+        each: Vec::new(),
         parameters: estimates(calibration, effects, &hypothesis.effects, covariance),
         onsets: BTreeMap::new(),
         equivalent: Vec::new(),

@@ -27,7 +27,7 @@ pub(crate) struct Search<'a> {
 }
 
 /// Limits of the search. Bound: effort. The slack is the evidence that a cause must have over no cause.
-const LIMITS: Limits = Limits { members: MAX_MEMBERS, starts: 2, fits: 6, slack: 3.0 };
+pub(crate) const LIMITS: Limits = Limits { members: MAX_MEMBERS, starts: 2, fits: 6, slack: 3.0 };
 /// Decrease of the cost by a single effect above which nuisances are linearised again at its fit: their derivatives differ there from those at the
 /// nominal point. Bound: an effect of fewer than five sigmas bends them by less than their errors.
 const RELINEARISING_DECREASE: f64 = 30.0;
@@ -200,7 +200,8 @@ impl Causes for Search<'_> {
     }
 }
 
-/// Removes effects whose 95 % interval contains neutral, and onsets without evidence against the same effect throughout.
+/// Removes effects whose 95 % interval contains neutral, onsets without evidence against the same effect throughout, and sets of which a part is
+/// among the fits and lacks less than the evidence of a cause for each further member.
 pub(crate) fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
     let simpler = |fit: &Fit| -> Option<Fit> {
         let study = search.study;
@@ -225,7 +226,16 @@ pub(crate) fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
         }
         kept.push(fit);
     }
-    ranked(search, kept.iter())
+    let kept = ranked(search, kept.iter());
+    let is_demanded = |fit: &&Fit| {
+        let all = members(&fit.hypothesis);
+        !kept.iter().any(|part| {
+            let some = members(&part.hypothesis);
+            let needed = search.calibration.threshold * all.len().saturating_sub(some.len()) as f64;
+            search.ln_odds(fit) - search.ln_odds(part) < needed && some.iter().all(|one| all.contains(one))
+        })
+    };
+    kept.iter().filter(is_demanded).cloned().collect()
 }
 
 /// The first effect of a fit whose 95 % intervals all contain neutral.

@@ -20,6 +20,7 @@ use mapper_physics::rig::effect::{Effect, EffectError, EffectInfo, EffectParamet
 use mapper_physics::simulation::driven::{DriveError, FrozenGrid};
 use mapper_physics::simulation::model::Model;
 use nalgebra::DMatrix;
+use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 /// Values of one output in one step with common noise.
@@ -85,6 +86,8 @@ pub struct Study {
     pub(crate) on_machine: Vec<bool>,
     /// Number of library effects; they are followed by candidates that begin with a step.
     pub catalogue: usize,
+    /// Logarithm of the number of closure terms among which each was chosen, by the index of its effect.
+    pub(crate) rarities: BTreeMap<usize, f64>,
     /// Nuisance parameters.
     pub nuisances: Vec<Nuisance>,
     /// Values of one output and step each.
@@ -285,6 +288,7 @@ impl Study {
             histories: vec![TimeHistory::THROUGHOUT; effects.len()],
             on_machine: effects.iter().map(|effect| acts_on_machine(&nominal, effect.as_ref())).collect(),
             catalogue: effects.len(),
+            rarities: BTreeMap::new(),
             actuators,
             scatter_s: times.scatter_s,
             rested: rested(&table, start_s),

@@ -54,6 +54,9 @@ const MIN_TOUCHES: usize = 3;
 
 /// ln of the odds above which a housing has more parts. Bound: 150 to 1; recordings of one part give less than 1e-9, of two more than 1e80.
 const PARTS_LN_ODDS: f64 = 5.0;
+/// Error that is left with three parts over the change from two to three. Bound: an error that falls with the number of parts,
+/// (1/3)/(1/2 - 1/3); with its square it would be 0.8.
+const LEFT_OVER_CHANGE: f64 = 2.0;
 /// Share of the area on the part with the thermocouple above which the other one is no inner wall. Bound: recordings of inner walls give less
 /// than 0.05.
 const INNER_WALL_AREA: f64 = 0.25;
@@ -325,12 +328,12 @@ struct Fitted {
     refined: Option<(Refinements, Gain)>,
     /// Dependence of the efficiencies on the declaration, fraction.
     prior_sensitivity: f64,
-    /// Change of each step's efficiency and ln h from a housing of two parts to one of three; `None` for other housings.
+    /// Error that a housing of three parts leaves in each step's efficiency and ln h, by its change from two parts; `None` for other housings.
     truncation: Option<Vec<[f64; 2]>>,
 }
 
 /// Fits a housing of one part and of two, and keeps the one that the recording favours. Where the gas touches both parts, the real housing
-/// has no parts but conducts everywhere: then a third part is added, and the change that it makes is the error that is left.
+/// has no parts but conducts everywhere: then a third part is added, and the change that it makes gives the error that is left.
 fn best_housing<'a>(
     problem: &mut Problem<'a>,
     steps: &'a [StepRows],
@@ -369,8 +372,9 @@ fn best_housing<'a>(
     minimise(problem, config)?;
     let after = point_values(problem, steps);
     let mut fitted = Fitted::of(problem, config)?;
-    let change = |(after, before): (&[f64; 2], &[f64; 2])| [after[0] - before[0], after[1] - before[1]];
-    fitted.truncation = Some(after.iter().zip(&before).map(change).collect());
+    let left =
+        |(after, before): (&[f64; 2], &[f64; 2])| [0, 1].map(|k| LEFT_OVER_CHANGE * (after[k] - before[k]));
+    fitted.truncation = Some(after.iter().zip(&before).map(left).collect());
     Some(fitted)
 }
 

@@ -292,7 +292,7 @@ impl Numbers {
         Numbers { eta, ln_h, common, budgets, eta_errors }
     }
 
-    /// With the error of a housing of few parts: the change of efficiency and ln h that the last part made, on both sides of each interval.
+    /// With the error of a housing of few parts: of efficiency and ln h, on both sides of each interval.
     pub(crate) fn with_truncation(mut self, changes: &[[f64; 2]]) -> Self {
         let numbers = [&mut self.eta, &mut self.ln_h];
         for (k, (numbers, common)) in numbers.into_iter().zip(&mut self.common).enumerate() {

@@ -200,8 +200,12 @@ impl Causes for Search<'_> {
     }
 }
 
+/// ln of the odds that a set must have over a part of it, for each further member. Source: Jeffreys, Theory of Probability, appendix B: odds
+/// below 10^(1/2) are not worth more than a bare mention.
+const DEMANDED_LN_ODDS: f64 = 1.15;
+
 /// Removes effects whose 95 % interval contains neutral, onsets without evidence against the same effect throughout, and sets of which a part is
-/// among the fits and lacks less than the evidence of a cause for each further member.
+/// among the fits and is nearly as likely.
 pub(crate) fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
     let simpler = |fit: &Fit| -> Option<Fit> {
         let study = search.study;
@@ -231,7 +235,7 @@ pub(crate) fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
         let all = members(&fit.hypothesis);
         !kept.iter().any(|part| {
             let some = members(&part.hypothesis);
-            let needed = search.calibration.threshold * all.len().saturating_sub(some.len()) as f64;
+            let needed = DEMANDED_LN_ODDS * all.len().saturating_sub(some.len()) as f64;
             search.ln_odds(fit) - search.ln_odds(part) < needed && some.iter().all(|one| all.contains(one))
         })
     };

@@ -200,8 +200,7 @@ impl Causes for Search<'_> {
     }
 }
 
-/// ln of the odds that a set must have over a part of it, for each further member. Source: Jeffreys, Theory of Probability, appendix B: odds
-/// below 10^(1/2) are not worth more than a bare mention.
+/// ln of the odds that a set must have over a part of it, for each further member. Source: Jeffreys, Theory of Probability, appendix B, 10^(1/2).
 const DEMANDED_LN_ODDS: f64 = 1.15;
 
 /// Removes effects whose 95 % interval contains neutral, onsets without evidence against the same effect throughout, and sets of which a part is

@@ -368,9 +368,3 @@ pub fn method_for(recording: &Recording, usual: Method) -> (Method, Option<Resul
     }
     (Method::Steady, Some(ResultRemark::ConventionalMapping { usual, missing: lost }))
 }
-
-/// Symbols with descriptions.
-pub(crate) fn names(channels: &[Channel]) -> String {
-    let named = |channel: &Channel| format!("{channel} ({})", channel.info().description);
-    channels.iter().map(named).collect::<Vec<_>>().join(", ")
-}

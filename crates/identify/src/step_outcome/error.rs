@@ -1,6 +1,5 @@
 //! Errors that stop identification altogether, and reasons why a single step gives no point.
 
-use crate::config::names;
 use mapper_core::{Channel, Method, step_number};
 
 /// Why a recording cannot be identified.
@@ -40,4 +39,10 @@ fn without_the_housing(missing: &[Channel]) -> &'static str {
         [Channel::Tc] => "; without it the method `steady` gives conventional efficiencies",
         _ => "",
     }
+}
+
+/// Symbols with descriptions.
+fn names(channels: &[Channel]) -> String {
+    let named = |channel: &Channel| format!("{channel} ({})", channel.info().description);
+    channels.iter().map(named).collect::<Vec<_>>().join(", ")
 }

@@ -7,7 +7,7 @@
 //! - Is a cause named? Yes, if its ln of odds against no cause exceeds a threshold.
 //! - Which causes do the data not distinguish? Those with odds of at least [`EXCLUDED_ODDS`] against the most probable one: the odds at
 //!   which an interval excludes a value.
-//! - Is it a cause that nobody modelled? The source states this probability: calibrated on the residual of the best fit, or from the
+//! - Is it an unmodelled cause? The source states this probability: calibrated on the residual of the best fit, or from the
 //!   evidence of a larger model error. All modelled explanations share the rest.
 
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, range};
@@ -55,7 +55,7 @@ pub struct CauseProbabilities {
     pub causes: Vec<RankedCause>,
     /// Of modelled causes that are not among the sets.
     pub unlisted: f64,
-    /// Of a cause that nobody modelled.
+    /// Of an unmodelled cause.
     pub unmodelled: f64,
     /// Whether a cause is named.
     pub named: bool,

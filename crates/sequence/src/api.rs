@@ -236,7 +236,7 @@ fn register_measurement(engine: &mut Engine, name: &'static str, value: fn(&Iden
 fn reading(result: &StepResult, channel: &str, of: fn((f64, f64)) -> f64) -> Result<Dynamic, ScriptThrow> {
     let unknown = |_| {
         let names = CHANNELS.iter().map(|row| row.channel.to_string()).collect::<Vec<_>>().join(", ");
-        throw(format!("there is no channel `{channel}`"), &format!("one of {names}"))
+        throw(format!("unknown channel `{channel}`"), &format!("one of {names}"))
     };
     let channel: Channel = channel.parse().map_err(unknown)?;
     Ok(number_or_unit(result.readings.get(&channel).copied().map(of)))

@@ -85,7 +85,7 @@ fn a_kept_diagnosis_corrects_as_a_new_one_and_only_its_own_recording() {
     refused("foreign.json", &text, &campaign.path, &other_night);
     refused("other_campaign.json", &text, &changed.path, &recording);
 
-    // Beside the recording it is found; one that does not belong there is not used, and the answer is that of a new diagnosis.
+    // Next to the recording it is found; one that does not belong there is not used, and the answer is that of a new diagnosis.
     std::fs::copy(&kept, recording.with_extension("diagnosis.json")).unwrap();
     let found = correct(&campaign.path, &recording, &[]).exits(0).json();
     assert_eq!(found["diagnosis_file"], recording.with_extension("diagnosis.json").to_str().unwrap());
@@ -103,17 +103,20 @@ fn a_stopped_diagnosis_leaves_nothing() {
     let recording = copied(&campaign, scratch.path(), "night.mcap");
     let arguments = ["gap".as_ref(), "diagnose".as_ref(), campaign.path.as_os_str(), recording.as_os_str()];
     let mut running = mapper_command(arguments)
-        .arg("--out")
+        .args(["--progress", "json", "--out"])
         .arg(scratch.path().join("kept.json"))
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     let mut messages = BufReader::new(running.stderr.take().unwrap()).lines().map(Result::unwrap);
-    messages.find(|line| line.contains("single effects")).unwrap();
+    let is_search = |line: &String| {
+        serde_json::from_str(line).is_ok_and(|message: Value| message["what"] == "single effects")
+    };
+    messages.find(is_search).unwrap();
     let id = running.id().to_string();
     Command::new("sh").args(["-c", "kill -INT \"$1\"", "sh", &id]).status().unwrap();
-    assert!(messages.any(|line| line.contains("stopped by the operator")));
+    messages.for_each(drop);
     assert_eq!(running.wait().unwrap().code(), Some(130));
     let left = std::fs::read_dir(scratch.path()).unwrap().map(|entry| entry.unwrap().file_name());
     assert_eq!(left.collect::<Vec<_>>(), ["night.mcap"]);

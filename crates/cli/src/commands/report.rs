@@ -23,7 +23,7 @@ pub struct Report {
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub reading: RecordingReading,
-    /// Also show the gap between the first run and the nominal model of this campaign: the diagnosis that `gap diagnose` left beside the
+    /// Also show the gap between the first run and the nominal model of this campaign: the diagnosis that `gap diagnose` left next to the
     /// recording, otherwise a new one, which takes up to a minute
     #[arg(long, value_name = "CAMPAIGN")]
     pub gap: Option<PathBuf>,

@@ -88,7 +88,7 @@ pub fn show_result(result: &(impl Serialize + Describe), as_json: bool) -> Resul
     if as_json { print_json(result) } else { show(&result.document()) }
 }
 
-/// States that the file beside a recording was not used, and why.
+/// States that the file next to a recording was not used, and why.
 pub fn warn_of_unused(gap: &Gap) {
     if let Some(error) = &gap.not_used {
         say(&format!("diagnosed again: {error}\n"));

@@ -1,4 +1,4 @@
-//! Sets of causes with a closure term. Closure terms are tried beside sets of library effects, and effects beside a closure term.
+//! Sets of causes with a closure term. Closure terms are tried together with sets of library effects, and effects together with a closure term.
 
 use crate::closure::columns::{Base, Products};
 use crate::closure::library as term_library;
@@ -19,7 +19,7 @@ const EFFORT: Effort =
     Effort { iterations: 5, enough: 0.2, max_sigmas: MAX_SIGMAS, max_sigmas_of_rig: MAX_SIGMAS, exact: true };
 /// Effort of fits that only select what to fit again. Bound: effort; three iterations order the terms.
 const QUICK: Effort = Effort { iterations: 3, enough: 1.0, exact: false, ..EFFORT };
-/// Maximum number of sets of effects beside which closure terms are tried, after the first ones. Bound: effort; two mostly agree.
+/// Maximum number of further sets of effects with which closure terms are tried. Bound: effort; two mostly agree.
 const MAX_ROUNDS: usize = 2;
 
 pub(crate) struct Combined<'a> {
@@ -58,13 +58,13 @@ impl<'a> Combined<'a> {
             for _ in 0..MAX_ROUNDS {
                 let Some(best) = self.ranked().into_iter().next() else { break };
                 let closure = |index: &usize| self.terms.closures.contains_key(index);
-                let mut beside = best.hypothesis.clone();
-                beside.effects.retain(|(index, _)| !closure(index));
-                if !tried.insert(members(&beside)) {
+                let mut effects = best.hypothesis.clone();
+                effects.effects.retain(|(index, _)| !closure(index));
+                if !tried.insert(members(&effects)) {
                     break;
                 }
                 let LibraryFits { study, linearised, .. } = self.library;
-                let Ok(there) = linearised.at(study, &beside) else { break };
+                let Ok(there) = linearised.at(study, &effects) else { break };
                 let counts = best
                     .hypothesis
                     .effects
@@ -73,7 +73,10 @@ impl<'a> Combined<'a> {
                 let columns = best.effect_columns.iter().zip(counts).filter(|(_, free)| *free);
                 let free = columns.map(|(column, _)| column.clone()).collect();
                 let residual = there.residual(study, &there.base);
-                self.add_terms(&Base { study, linearised: &there, hypothesis: beside, residual, free }, late);
+                self.add_terms(
+                    &Base { study, linearised: &there, hypothesis: effects, residual, free },
+                    late,
+                );
                 self.add_effects();
             }
             if self.leaves_only_noise() {
@@ -111,7 +114,7 @@ impl<'a> Combined<'a> {
         })
     }
 
-    /// Tries every closure term beside the causes of a base: in closed form, then the most promising ones with model runs.
+    /// Tries every closure term with the causes of a base: in closed form, then the most promising ones with model runs.
     fn add_terms(&mut self, base: &Base<'_>, late: bool) {
         let library = &mut self.terms.library;
         // Terms that begin later were added behind the library's own.
@@ -147,7 +150,7 @@ impl<'a> Combined<'a> {
         self.known = known;
     }
 
-    /// Adds, replaces and removes effects beside the best closure term.
+    /// Adds effects to the best closure term, replaces and removes them.
     fn add_effects(&mut self) {
         let Some(best) = self.ranked().into_iter().next() else { return };
         let Ok(there) = self.library.linearised.at(&self.terms.study, &best.hypothesis) else { return };

@@ -41,7 +41,7 @@ pub(crate) struct Proposed {
     pub(crate) study: Study,
     /// Probability of no cause.
     pub(crate) none: f64,
-    /// Probability of a cause that nobody modelled.
+    /// Probability of an unmodelled cause.
     pub(crate) unmodelled: f64,
     /// Most probable first; a closure term is the last effect of its fit.
     pub(crate) causes: Vec<(Candidate, Fit, Option<ClosureKey>)>,
@@ -126,10 +126,10 @@ fn propose(
         let (fit, closure) = all[cause.set];
         let posterior = (&probabilities, causes.as_slice(), cause);
         let Some(closure) = closure else { return candidate_of(calibration, study, fit, posterior) };
-        let mut beside = fit.clone();
-        beside.hypothesis.effects.retain(|(index, _)| *index != closure.effect);
+        let mut effects = fit.clone();
+        effects.hypothesis.effects.retain(|(index, _)| *index != closure.effect);
         let of_closure = probabilities.of_member(causes, closure.effect);
-        candidate_of(calibration, study, &beside, posterior)
+        candidate_of(calibration, study, &effects, posterior)
             .with_closure(&describe(closure).sentence, of_closure)
     };
     let found = probabilities.causes.iter().map(|cause| {
@@ -139,8 +139,8 @@ fn propose(
     let found: Vec<(Candidate, Fit, Option<ClosureKey>)> = found.collect();
     let ClosureDescription { sentence, terms: coefficients, .. } = description;
     let others = found[..alike.len()].iter().filter_map(|(cause, ..)| cause.closure().cloned());
-    let beside = found.first().map_or(&[][..], |(cause, ..)| &cause.effects);
-    let beside = beside.iter().filter(|id| *id != Candidate::CLOSURE).cloned().collect();
+    let effects = found.first().map_or(&[][..], |(cause, ..)| &cause.effects);
+    let with_effects = effects.iter().filter(|id| *id != Candidate::CLOSURE).cloned().collect();
     let closure_term = ClosureTerm {
         submodel: terms.library[best.choice.terms[0]].submodel().name().to_owned(),
         equivalent: others.filter(|other| *other != sentence).collect(),
@@ -149,7 +149,7 @@ fn propose(
         probability: probabilities.of_member(causes, best.effect),
         gap_reduction: gap.gap_reduction,
         held_out_steps: gap.held_out_steps.len(),
-        beside,
+        with_effects,
         rhai: None,
         script,
     };

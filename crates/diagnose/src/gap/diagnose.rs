@@ -121,7 +121,7 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     let settled = closure.proposed.as_ref();
     let settled = settled.filter(|found| is_open(verdict) && found.closure_term.probability > 0.5);
     let verdict = match settled {
-        Some(found) if found.closure_term.beside.is_empty() => Verdict::Unexplained,
+        Some(found) if found.closure_term.with_effects.is_empty() => Verdict::Unexplained,
         Some(_) => Verdict::PartlyExplained,
         None => verdict,
     };

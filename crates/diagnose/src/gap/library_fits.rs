@@ -103,7 +103,7 @@ impl LibraryFits {
         self.fits.first().unwrap_or(&self.null)
     }
 
-    /// The causes beside which a closure term is tried: the best one, and the best single effect, because several imitate what is outside.
+    /// The causes with which a closure term is tried: the best one, and the best single effect, because several imitate what is outside.
     pub(crate) fn bases(&self) -> impl Iterator<Item = &Fit> {
         let single = |fit: &&Fit| fit.hypothesis.effects.len() == 1;
         let best = self.fits.first().filter(|best| !single(best));

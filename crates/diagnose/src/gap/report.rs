@@ -161,7 +161,7 @@ pub struct ClosureTerm {
     /// Number of these held-out steps.
     pub held_out_steps: usize,
     /// Library effects fitted together with the term; empty if it was found alone.
-    pub beside: Vec<String>,
+    pub with_effects: Vec<String>,
     /// Closure terms that the recording cannot distinguish from this one, as sentences.
     pub equivalent: Vec<String>,
     /// Name of the effect file written for it.

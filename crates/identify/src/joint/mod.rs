@@ -57,7 +57,7 @@ const PARTS_LN_ODDS: f64 = 5.0;
 /// Error that is left with three parts over the change from two to three. Bound: an error that falls with the number of parts,
 /// (1/3)/(1/2 - 1/3); with its square it would be 0.8.
 const LEFT_OVER_CHANGE: f64 = 2.0;
-/// Share of the area on the part with the thermocouple above which the other one is no inner wall. Bound: recordings of inner walls give less
+/// Share of the area on the part with the thermocouple up to which the other one may be an inner wall. Bound: recordings of inner walls give less
 /// than 0.05.
 const INNER_WALL_AREA: f64 = 0.25;
 
@@ -355,7 +355,7 @@ fn best_housing<'a>(
         let mut other = fit::start::with_parts(&start, parts);
         let favoured = minimise_in_stages(&mut other, config)
             .and_then(|()| Some(other.ln_evidence()? - problem.ln_evidence()?));
-        // On a bound it is no part, and Laplace's method does not hold there.
+        // On a bound the part does not exist, and Laplace's method does not hold there.
         let is_inside = [LOGIT_INNER, LN_INNER_CONDUCTANCE].into_iter().all(|index| {
             let (low, high) = bounds(index);
             other.shared[index] > low && other.shared[index] < high

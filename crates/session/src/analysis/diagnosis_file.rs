@@ -114,14 +114,14 @@ pub(crate) fn refused(path: &Path, source: StoredDiagnosisError) -> SessionError
     SessionError::StoredDiagnosis { path: path.to_owned(), source: Box::new(source) }
 }
 
-/// Where the diagnosis of a recording is looked for: `NAME.diagnosis.json` beside it.
-pub(crate) fn beside(recorded: &Recorded) -> PathBuf {
+/// Where the diagnosis of a recording is looked for: `NAME.diagnosis.json` next to it.
+pub(crate) fn next_to(recorded: &Recorded) -> PathBuf {
     recorded.path.with_extension("diagnosis.json")
 }
 
-/// The file that the diagnosis of a run is written to: the one beside its recording. `None` for a recording that is not in a run directory.
+/// The file that the diagnosis of a run is written to: the one next to its recording. `None` for a recording that is not in a run directory.
 pub fn diagnosis_of_run(recorded: &Recorded) -> Option<PathBuf> {
-    run_directory::is_recording(&recorded.path).then(|| beside(recorded))
+    run_directory::is_recording(&recorded.path).then(|| next_to(recorded))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The diagnosis of a gap, and the experiments that it recommends.
 
-use crate::analysis::diagnosis_file::{MadeFrom, beside, read, refused, sealed};
+use crate::analysis::diagnosis_file::{MadeFrom, next_to, read, refused, sealed};
 use crate::analysis::identification::Identified;
 use crate::plan::planning::{PlanInputs, nominal_model, plan};
 use crate::recording::files::{DIAGNOSIS_FORMAT, Versioned};
@@ -43,7 +43,7 @@ pub struct Gap {
     pub made_from: MadeFrom,
     /// The file that it was read from; `None` if it is new.
     pub stored: Option<PathBuf>,
-    /// Why the file beside the recording was not used.
+    /// Why the file next to the recording was not used.
     pub not_used: Option<SessionError>,
 }
 
@@ -154,7 +154,7 @@ impl Session<'_> {
 }
 
 impl Session<'_> {
-    /// The diagnosis of a recording: from the file `stored`, from the file beside the recording if it belongs to it, or a new one.
+    /// The diagnosis of a recording: from the file `stored`, from the file next to the recording if it belongs to it, or a new one.
     pub fn gap(
         &self,
         recorded: &Recorded,
@@ -165,7 +165,7 @@ impl Session<'_> {
         if let Some(path) = stored {
             return self.restored(path, recorded, (campaign, map), effects);
         }
-        let path = beside(recorded);
+        let path = next_to(recorded);
         let found = path.is_file().then(|| self.restored(&path, recorded, (campaign, map), effects.clone()));
         let not_used = match found.transpose() {
             Ok(Some(gap)) => return Ok(gap),

@@ -80,7 +80,7 @@ pub struct ScoredCase {
     pub probability: Option<f64>,
     /// Whether the diagnosis is correct.
     pub right: bool,
-    /// Length of the weakest cause's signature beside the others, in sigmas; `None` without causes or an answer that contains it.
+    /// Length of the weakest cause's signature in addition to the others, in sigmas; `None` without causes or an answer that contains it.
     pub sigma: Option<f64>,
 }
 

@@ -23,7 +23,7 @@ pub struct Correct {
     /// Write points, map, pictures and report to this directory, corrected if a correction is allowed; existing files are not replaced
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Diagnosis, as `gap diagnose` writes it [default: the one beside the recording if it belongs to it, otherwise a new one]
+    /// Diagnosis, as `gap diagnose` writes it [default: the one next to the recording if it belongs to it, otherwise a new one]
     #[arg(long, value_name = "FILE")]
     pub diagnosis: Option<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)

@@ -42,7 +42,7 @@ pub struct Diagnose {
     /// Write each closure term that is found as an effect in rhai into this directory
     #[arg(long, value_name = "DIR")]
     pub closure_terms: Option<PathBuf>,
-    /// Write the diagnosis to this file, from which `gap correct`, `report --gap`, `gap apply` and `gap predict` continue [default: beside the
+    /// Write the diagnosis to this file, from which `gap correct`, `report --gap`, `gap apply` and `gap predict` continue [default: next to the
     /// recording of a run directory]
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,

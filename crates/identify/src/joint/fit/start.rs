@@ -224,14 +224,7 @@ pub(crate) fn problem<'a>(
     let choice = &config.joint;
     let reynolds = |step: &StepRows| reynolds(step.end.flow_kg_s, config.outlet_diameter_m, step.end.t2_k);
     let ln_reference = steps.iter().map(|step| reynolds(step).ln()).sum::<f64>() / steps.len() as f64;
-    let setting = Setting {
-        exact_at: config.exact_at,
-        air: config.air,
-        internal_area_m2: config.internal_area_m2,
-        outlet_diameter_m: config.outlet_diameter_m,
-        inlet_diameter_m: config.inlet_diameter_m,
-        reynolds_reference: ln_reference.exp(),
-    };
+    let setting = Setting::of(config, ln_reference.exp());
 
     let free = Prior { mean: 0.0, sigma: f64::INFINITY };
     let mut priors = [free; SHARED];

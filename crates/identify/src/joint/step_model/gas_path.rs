@@ -1,6 +1,6 @@
 //! The gas path of the model of a step, and its housing.
 
-use crate::config::Housing;
+use crate::config::{Housing, IdentifyConfig};
 use crate::joint::step_model::parameters::{
     BEARING, EXPONENT, EXTERNAL, HEAT, HEAT_BY_TC, LN_COEFFICIENT, LN_OIL, RADIATION, SharedVector,
 };
@@ -149,6 +149,17 @@ pub(crate) fn reynolds(flow_kg_s: f64, diameter_m: f64, bulk_k: f64) -> f64 {
 }
 
 impl Setting {
+    pub(crate) fn of(config: &IdentifyConfig, reynolds_reference: f64) -> Self {
+        Setting {
+            exact_at: config.exact_at,
+            air: config.air,
+            internal_area_m2: config.internal_area_m2,
+            outlet_diameter_m: config.outlet_diameter_m,
+            inlet_diameter_m: config.inlet_diameter_m,
+            reynolds_reference,
+        }
+    }
+
     fn air(&self, inputs: &Inputs) -> Air {
         self.air
             .with_humidity(self.air.humidity_kg_kg() + inputs.humidity_kg_kg)

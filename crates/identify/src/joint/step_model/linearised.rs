@@ -10,7 +10,7 @@ use crate::joint::step_model::parameters::{
     P2_GAIN, P2_OFFSET, PREHEAT, PROBE_MM2, STEP_HEAT, SURFACE, SharedVector, T2_GAIN, T2_OFFSET, TC_GAIN,
     TC_LAG, TC_OFFSET, TERM_COUNT, THERMOMETERS, dot,
 };
-use crate::joint::step_model::parts::{Division, OTHERS, Parts, PartsRow};
+use crate::joint::step_model::parts::{Division, OTHERS, Parts, PartsRow, SETTLED_ROUNDS};
 use crate::joint::step_model::rows::{Row, StepRows};
 use crate::single_step::fit::{self, Lag, follow};
 use mapper_core::unit_factors::M_PER_MM;
@@ -18,8 +18,6 @@ use mapper_physics::rig::sensor_fault::ExactReadings;
 
 /// Step of the derivative by the square of the probe's diameter, relative. Bound: between rounding and curvature.
 const PROBE_STEP_RATIO: f64 = 1e-3;
-/// Iterations to the change of settled parts. Bound: each reduces what is left at least threefold.
-const SETTLED_ROUNDS: usize = 8;
 /// Square of the diameter below which the lag is linear in it, mm2: it grows with a power below 1, which has no slope at 0. Bound: 0.3 mm lag
 /// by a tenth of a second, below anything that a block of half a second shows.
 pub(crate) const LINEAR_BELOW_MM2: f64 = 0.1;
@@ -509,14 +507,8 @@ mod tests {
 
     fn model(parts: Parts) -> Model {
         let config = IdentifyConfig::default();
-        let setting = Setting {
-            internal_area_m2: config.internal_area_m2,
-            outlet_diameter_m: config.outlet_diameter_m,
-            inlet_diameter_m: config.inlet_diameter_m,
-            exact_at: ExactReadings { pressure_pa: 100e3, temperature_k: 297.0 },
-            air: config.air,
-            reynolds_reference: 1.3e5,
-        };
+        let exact_at = ExactReadings { pressure_pa: 100e3, temperature_k: 297.0 };
+        let setting = Setting { exact_at, ..Setting::of(&config, 1.3e5) };
         Model { setting, housing: config.housing, parts, has_balance: true }
     }
 

@@ -21,8 +21,8 @@ use crate::joint::step_model::parameters::{
 pub(crate) const OTHERS: usize = 2;
 /// Exponent below which the mean over a row replaces the formula. Bound: the next term is below rounding.
 const SERIES_BELOW: f64 = 1e-6;
-/// Iterations to the temperatures of settled parts. Bound: each reduces their distance, some 10 K, at least threefold.
-const SETTLED_ROUNDS: usize = 8;
+/// Iterations to the temperatures of settled parts, and to changes of them. Bound: each reduces their distance, some 10 K, at least threefold.
+pub(crate) const SETTLED_ROUNDS: usize = 8;
 /// Step of the derivatives by the division's parameters. Bound: between rounding and curvature.
 const DIVISION_STEP: f64 = 1e-4;
 
@@ -246,14 +246,8 @@ mod tests {
     #[test]
     fn settled_parts_pass_on_the_heat_of_gas_and_bearing() {
         let config = IdentifyConfig::default();
-        let setting = Setting {
-            internal_area_m2: config.internal_area_m2,
-            outlet_diameter_m: config.outlet_diameter_m,
-            inlet_diameter_m: config.inlet_diameter_m,
-            exact_at: ExactReadings { pressure_pa: 100e3, temperature_k: 297.0 },
-            air: config.air,
-            reynolds_reference: 1.3e5,
-        };
+        let exact_at = ExactReadings { pressure_pa: 100e3, temperature_k: 297.0 };
+        let setting = Setting { exact_at, ..Setting::of(&config, 1.3e5) };
         let mut shared = [0.0; SHARED];
         shared[LN_COEFFICIENT] = 0.004_f64.ln() + 1.13 * 1.3e5_f64.ln();
         shared[EXPONENT] = 1.13;

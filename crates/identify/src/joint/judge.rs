@@ -81,7 +81,7 @@ pub(crate) fn may_have_parts(problem: &Problem<'_>) -> bool {
         || prior(LN_DEVIATION) > SUSPECT_SPREADS * LAW_SIGMA
         || prior(STEP_HEAT) > SUSPECT_SPREADS * STEP_HEAT_SIGMA_W
         || problem.surface_sigma > SUSPECT_SPREADS * SURFACE_SIGMA
-        || problem.members.iter().any(|member| !member.contributes)
+        || problem.members.iter().any(|member| !(member.contributes || member.excluded))
 }
 
 /// Excludes steps that fit far worse than the others from the shared parameters: their mean square exceeds that of the median step (at least 1)

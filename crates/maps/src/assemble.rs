@@ -292,7 +292,7 @@ pub fn convert_efficiency(
         for point in map.lines.iter_mut().flat_map(|line| &mut line.points) {
             if let Some(eta) = point.eta.filter(|eta| *eta > 0.0 && point.pressure_ratio > 1.0) {
                 let air = air.between(p_ref_pa, point.pressure_ratio * p_ref_pa);
-                scale(point, efficiency_by(to, eta, point.pressure_ratio, t_ref_k, air) / eta);
+                scale_efficiency(point, efficiency_by(to, eta, point.pressure_ratio, t_ref_k, air) / eta);
             }
         }
         map.fitted = None;
@@ -301,7 +301,8 @@ pub fn convert_efficiency(
     map
 }
 
-fn scale(point: &mut MapPoint, ratio: f64) {
+/// Multiplies the efficiency of a point, with its interval and errors.
+pub(crate) fn scale_efficiency(point: &mut MapPoint, ratio: f64) {
     let identified = &mut point.identified;
     let values = [&mut point.eta, &mut identified.eta, &mut identified.eta_low, &mut identified.eta_high];
     values.into_iter().flatten().for_each(|value| *value *= ratio);

@@ -1,12 +1,14 @@
-//! Compares maps, and the ends of their lines.
+//! Compares maps of compressors and of turbines, and the ends of their lines.
 
 use crate::assemble::convert_efficiency;
 use crate::map_fit::{MIN_FLOW_KG_S, MIN_RATIO_RANGE, MapFit, MapFitError, MapFitOptions};
+use crate::turbine::turbine_fit::{TurbineFit, TurbineFitError};
 use mapper_core::{
-    CompressorMap, EndEvidence, FittedLine, FittedNode, LineEnd, MapPoint, SpeedLine, Warning,
-    confidence_interval_95,
+    CompressorMap, EndEvidence, FittedLine, FittedNode, LineEnd, MapPoint, SpeedLine, TurbineMap,
+    TurbineMapPoint, Warning, confidence_interval_95,
 };
 use mapper_numerics::polyline::NearestOnPolyline;
+use mapper_numerics::statistics::{mean, rms};
 use serde::Serialize;
 
 /// Relative difference of the speeds of one line. Bound: half of what stands hold.
@@ -17,7 +19,7 @@ const PLACES: usize = 25;
 /// Nodes of the fitted lines for each compared place. Bound: the nearest place is then between nodes a hundredth of a line apart.
 const NODES_PER_PLACE: usize = 4;
 /// Maximum relative difference between the speeds of end lines that count as equal. Bound: stands hold a speed within 1 %.
-const END_TOLERANCE_RATIO: f64 = 0.01;
+pub(crate) const END_TOLERANCE_RATIO: f64 = 0.01;
 
 /// A place of the second map compared with the nearest place of the first at equal corrected speed. Differences: second minus
 /// first.
@@ -55,7 +57,7 @@ impl PlaceComparison {
     }
 }
 
-pub(crate) fn excludes_zero(difference: f64, standard_error: f64) -> bool {
+fn excludes_zero(difference: f64, standard_error: f64) -> bool {
     let (low, high) = confidence_interval_95(difference, standard_error);
     low > 0.0 || high < 0.0
 }
@@ -345,4 +347,86 @@ fn mark(point: Option<&mut MapPoint>, evidence: EndEvidence, warning: fn(EndEvid
     if let Some(point) = point.filter(|_| evidence != EndEvidence::NotReached) {
         point.identified.warnings.push(warning(evidence));
     }
+}
+
+/// A point of the second map compared with the first. Differences: second minus first.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TurbinePointComparison {
+    /// The point.
+    pub point: TurbineMapPoint,
+    /// Difference of flow, fraction of the first's.
+    pub flow_difference_ratio: f64,
+    /// Its standard error, both maps together.
+    pub flow_standard_error_ratio: f64,
+    /// Difference of efficiency, fraction.
+    pub efficiency_difference: Option<f64>,
+    /// Its standard error.
+    pub efficiency_standard_error: Option<f64>,
+}
+
+/// Comparison of two turbine maps.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TurbineComparison {
+    /// Points of the second map within the first.
+    pub points: Vec<TurbinePointComparison>,
+    /// Number of points outside the first map.
+    pub not_compared: usize,
+    /// Mean difference of flow, fraction; `None` without common places.
+    pub flow_difference_mean_ratio: Option<f64>,
+    /// Root mean square of the difference of flow.
+    pub flow_difference_rms_ratio: Option<f64>,
+    /// Mean difference of efficiency, fraction.
+    pub efficiency_difference_mean: Option<f64>,
+    /// Root mean square of the difference of efficiency.
+    pub efficiency_difference_rms: Option<f64>,
+    /// Share of points whose flow differs beyond its 95 % interval.
+    pub flow_differs_ratio: f64,
+    /// Share of points whose efficiency differs beyond its 95 % interval.
+    pub efficiency_differs_ratio: f64,
+}
+
+/// Compares two maps.
+pub fn compare_turbines(
+    first: &TurbineMap,
+    second: &TurbineMap,
+) -> Result<TurbineComparison, TurbineFitError> {
+    let fit = TurbineFit::new(first)?;
+    let places = second.points.iter().map(|point| {
+        (point, fit.at(point.vane_position, point.speed_parameter_rpm_sqrt_k, point.expansion_ratio))
+    });
+    let (outside, inside): (Vec<_>, Vec<_>) = places.partition(|(_, place)| place.extrapolated);
+    let points: Vec<TurbinePointComparison> = inside
+        .into_iter()
+        .map(|(point, place)| {
+            // The standard error is that of a measurement, so it includes the scatter of the second map.
+            let (flow_standard_error_ratio, efficiency_standard_error) = fit.standard_errors(point);
+            let flow = point.flow_parameter_kg_sqrt_k_s_kpa / place.flow_parameter_kg_sqrt_k_s_kpa;
+            TurbinePointComparison {
+                point: *point,
+                flow_difference_ratio: flow - 1.0,
+                flow_standard_error_ratio,
+                efficiency_difference: point.efficiency.zip(place.efficiency).map(|(own, first)| own - first),
+                efficiency_standard_error,
+            }
+        })
+        .collect();
+    let flows = || points.iter().map(|point| point.flow_difference_ratio);
+    let efficiencies = || points.iter().filter_map(|point| point.efficiency_difference);
+    let share = |pairs: Vec<(f64, f64)>| {
+        let differs = |(difference, error): &&(f64, f64)| excludes_zero(*difference, *error);
+        pairs.iter().filter(differs).count() as f64 / pairs.len().max(1) as f64
+    };
+    let flow_pairs = points.iter().map(|p| (p.flow_difference_ratio, p.flow_standard_error_ratio)).collect();
+    let efficiency_pairs =
+        points.iter().filter_map(|p| p.efficiency_difference.zip(p.efficiency_standard_error)).collect();
+    Ok(TurbineComparison {
+        not_compared: outside.len(),
+        flow_difference_mean_ratio: mean(flows()),
+        flow_difference_rms_ratio: rms(flows()),
+        efficiency_difference_mean: mean(efficiencies()),
+        efficiency_difference_rms: rms(efficiencies()),
+        flow_differs_ratio: share(flow_pairs),
+        efficiency_differs_ratio: share(efficiency_pairs),
+        points,
+    })
 }

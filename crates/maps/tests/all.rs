@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 mod assemble;
+mod derived;
 mod efficiency;
 mod line_ends;
 mod map_fit;

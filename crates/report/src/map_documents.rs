@@ -10,7 +10,7 @@ use mapper_core::{
     TurbineMapPoint, half_width_95,
 };
 use mapper_maps::{
-    DetectedEnd, LineEnds, MapComparison, PlaceComparison, ReducedTurbinePoint, TurbineComparison,
+    DetectedEnd, LineEnds, MapComparison, MergedMap, PlaceComparison, ReducedTurbinePoint, TurbineComparison,
 };
 use mapper_numerics::statistics::mean;
 
@@ -181,6 +181,30 @@ impl Describe for MapComparison {
         if !comparison.not_compared_rpm.is_empty() {
             let speeds: Vec<String> = comparison.not_compared_rpm.iter().map(|s| format!("{s:.0}")).collect();
             document.text(format!("Only one of the maps reaches {} rpm: not compared.", speeds.join(", ")));
+        }
+        document
+    }
+}
+
+impl Describe for MergedMap {
+    fn document(&self) -> Document {
+        let mut table = Table::new(["corrected rpm", "of the first", "of the second", "left out"]);
+        for line in &self.lines {
+            table.row([
+                format!("{:.0}", line.speed_corrected_rpm),
+                line.of_first.to_string(),
+                line.of_second.to_string(),
+                line.left_out.to_string(),
+            ]);
+        }
+        let mut document = Document::default();
+        document.table(table);
+        document.text(
+            "Points of each line; those of the second map are left out where the first one has its own line.",
+        );
+        match &self.seam {
+            Some(seam) => document.append(seam.document()),
+            None => document.text("The maps have no common place, so nothing shows how well they meet."),
         }
         document
     }

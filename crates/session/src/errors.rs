@@ -10,7 +10,7 @@ use mapper_fmu::FmuError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
 use mapper_maps::table::DescriptionError;
-use mapper_maps::{AssembleError, MapFitError, TurbineFitError};
+use mapper_maps::{AssembleError, MapFitError, ScaleError, TurbineFitError};
 use mapper_observe::OtherMachine;
 use mapper_physics::compressor_map::tabulated_map::MapError;
 use mapper_physics::simulation::steady::SteadyError;
@@ -451,6 +451,8 @@ pub enum MapWorkError {
     NotCompared(#[from] MapFitError),
     #[error("{}: {}", .0.display(), .1)]
     TurbineNotFitted(PathBuf, #[source] TurbineFitError),
+    #[error("{}: {}", .0.display(), .1)]
+    NotScaled(PathBuf, #[source] ScaleError),
     /// A table whose points are corrected already.
     #[error(
         "{} is not a table of measured points, which has columns for N, flow, P1, T1, P2 and T2 (of a turbine N, flow, P3, T3, P4 and T4); inspect the columns that were recognised",

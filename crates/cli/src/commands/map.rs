@@ -1,12 +1,12 @@
-//! `mapper map`: maps are inspected, fitted, converted, compared, reduced and exported.
+//! `mapper map`: maps are inspected, fitted, converted, compared, scaled, merged, reduced and exported.
 
 use crate::command_line::{MapReading, RecordingReading, reference, subcommands};
 use crate::environment::registry;
 use crate::output::failure::Failure;
 use crate::output::standard_output::{self, FileOutput, MapTarget};
 use clap::Args;
-use mapper_core::EfficiencyDefinition;
-use mapper_maps::MapFitOptions;
+use mapper_core::{EfficiencyDefinition, MapDescription};
+use mapper_maps::{MapFitOptions, MapScale};
 use mapper_session::{Recorded, Session};
 use std::path::PathBuf;
 
@@ -22,6 +22,8 @@ subcommands! { MapCommand:
     Fit,
     Convert,
     Compare,
+    Scale,
+    Merge,
     Reduce,
     Rig,
     Fmu,
@@ -30,6 +32,28 @@ subcommands! { MapCommand:
 impl Map {
     pub fn run(&self) -> Result<(), Failure> {
         self.command.run()
+    }
+}
+
+/// Statements about a second map
+#[derive(Debug, Args)]
+pub struct SecondMap {
+    /// Reference state of the second map, if its file does not give it
+    #[arg(long, value_name = "STATE")]
+    pub second_reference: Option<String>,
+    /// Map description of the second map
+    #[arg(long, value_name = "FILE")]
+    pub second_description: Option<PathBuf>,
+}
+
+impl SecondMap {
+    fn description(&self) -> Result<MapDescription, Failure> {
+        let reading = MapReading {
+            reference: self.second_reference.clone(),
+            description: self.second_description.clone(),
+            ..MapReading::default()
+        };
+        reading.description()
     }
 }
 
@@ -42,12 +66,8 @@ pub struct Compare {
     pub second: PathBuf,
     #[command(flatten)]
     pub reading: MapReading,
-    /// Reference state of the second map, if its file does not give it
-    #[arg(long, value_name = "STATE")]
-    pub second_reference: Option<String>,
-    /// Map description of the second map
-    #[arg(long, value_name = "FILE")]
-    pub second_description: Option<PathBuf>,
+    #[command(flatten)]
+    pub of_second: SecondMap,
     /// Draw both maps and their difference in this new file (.svg or .png)
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
@@ -57,12 +77,7 @@ pub struct Compare {
 
 impl Compare {
     pub fn run(&self) -> Result<(), Failure> {
-        let of_second = MapReading {
-            reference: self.second_reference.clone(),
-            description: self.second_description.clone(),
-            ..MapReading::default()
-        };
-        let (first, second) = (self.reading.description()?, of_second.description()?);
+        let (first, second) = (self.reading.description()?, self.of_second.description()?);
         let picture = self.picture.as_deref().map(|path| (path, self.output.existing()));
         let maps = [(self.first.as_path(), &first), (self.second.as_path(), &second)];
         let work = registry().compare_map_files(maps, picture)?;
@@ -103,6 +118,77 @@ impl Convert {
         let description = self.reading.description()?;
         let registry = registry();
         let work = registry.convert_map_file(&self.map, &description, out, to_reference, efficiencies)?;
+        standard_output::print_map_work(&work, self.output.json)
+    }
+}
+
+/// Write the map of a similar machine: flow, pressure ratio, efficiency and speed times a factor
+#[derive(Debug, Args)]
+pub struct Scale {
+    /// Map
+    pub map: PathBuf,
+    /// New file; its extension gives the format unless `--to` does
+    pub out: PathBuf,
+    /// Format of the new file
+    #[arg(long, value_name = "FORMAT")]
+    pub to: Option<String>,
+    /// Wheel diameter over that of the map, at equal blade Mach numbers: flow times its square, speed over it
+    #[arg(long, value_name = "RATIO", default_value_t = 1.0)]
+    pub size: f64,
+    /// Factor on the corrected flow, also of a trim in proportion to the inducer's area
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    pub flow: f64,
+    /// Factor on PR - 1
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    pub pressure_ratio: f64,
+    /// Factor on the efficiency
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    pub efficiency: f64,
+    /// Factor on the corrected speed
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    pub speed: f64,
+    #[command(flatten)]
+    pub reading: MapReading,
+    #[command(flatten)]
+    pub output: FileOutput,
+}
+
+impl Scale {
+    pub fn run(&self) -> Result<(), Failure> {
+        let Scale { flow, pressure_ratio, efficiency, speed, .. } = *self;
+        let scale = MapScale::of_size(self.size).and(MapScale { flow, pressure_ratio, efficiency, speed });
+        let out = self.output.map(&self.out, self.to.as_deref());
+        let work = registry().scale_map_file((&self.map, &self.reading.description()?), scale, out)?;
+        standard_output::print_map_work(&work, self.output.json)
+    }
+}
+
+/// Write two maps of one machine, e.g. of low and of high speeds, as one, and show how well they meet
+#[derive(Debug, Args)]
+pub struct Merge {
+    /// Map whose points are kept
+    pub first: PathBuf,
+    /// Map that adds lines, and points beyond the ends of common lines
+    pub second: PathBuf,
+    /// New file; its extension gives the format unless `--to` does
+    pub out: PathBuf,
+    /// Format of the new file
+    #[arg(long, value_name = "FORMAT")]
+    pub to: Option<String>,
+    #[command(flatten)]
+    pub reading: MapReading,
+    #[command(flatten)]
+    pub of_second: SecondMap,
+    #[command(flatten)]
+    pub output: FileOutput,
+}
+
+impl Merge {
+    pub fn run(&self) -> Result<(), Failure> {
+        let (first, second) = (self.reading.description()?, self.of_second.description()?);
+        let out = self.output.map(&self.out, self.to.as_deref());
+        let maps = [(self.first.as_path(), &first), (self.second.as_path(), &second)];
+        let work = registry().merge_map_files(maps, out)?;
         standard_output::print_map_work(&work, self.output.json)
     }
 }

@@ -75,8 +75,14 @@ pub struct CompressorMap {
 impl CompressorMap {
     /// Refers the corrected flows and speeds to another reference state.
     pub fn at_reference(mut self, reference: ReferenceState) -> Self {
-        let (flow, speed) =
-            (self.reference.flow_factor_to(reference), self.reference.speed_factor_to(reference));
+        let speed = self.reference.speed_factor_to(reference);
+        self.scale_corrected(speed, self.reference.flow_factor_to(reference));
+        self.reference = reference;
+        self
+    }
+
+    /// Multiplies all corrected speeds and flows, with their errors.
+    pub fn scale_corrected(&mut self, speed: f64, flow: f64) {
         for line in &mut self.lines {
             line.speed_corrected_rpm *= speed;
             line.speed_spread_rpm *= speed;
@@ -94,8 +100,6 @@ impl CompressorMap {
         if let Some(fitted) = &mut self.fitted {
             fitted.scale(speed, flow);
         }
-        self.reference = reference;
-        self
     }
 }
 

@@ -5,11 +5,14 @@ use crate::machine::map_file::write_map_fitted_if_needed;
 use crate::recording::files::Existing;
 use crate::{Registry, SessionError, write_file, write_map};
 use mapper_core::{
-    EfficiencyDefinition, ExportError, ImportError, ImportRemark, ImportedMap, ImportedTurbine,
-    MapDescription, MapFormat, MapPoint, ReferenceState, TurbineMap, Verdict,
+    CompressorMap, EfficiencyDefinition, ExportError, ImportError, ImportRemark, ImportedMap,
+    ImportedTurbine, MapDescription, MapFormat, MapPoint, ReferenceState, TurbineMap, Verdict,
 };
 use mapper_maps::table::{description_text, turbine_description_text};
-use mapper_maps::{MapFitOptions, compare, compare_turbines, convert_efficiency, fit_map, fit_turbine};
+use mapper_maps::{
+    MapFitOptions, MapScale, compare, compare_turbines, convert_efficiency, fit_map, fit_turbine, merge,
+    scaled,
+};
 use mapper_report::{
     Describe, Document, Message, distinct_names, map_comparison_figure, map_fit, turbine_fit,
 };
@@ -51,6 +54,10 @@ impl MapOut<'_> {
     pub(crate) fn format(&self, registry: &Registry) -> Result<&'static MapFormat, SessionError> {
         registry.format_of(self.path, self.format)
     }
+}
+
+fn fitted_note(fitted: bool) -> &'static str {
+    if fitted { "; the format is a table, so the map was fitted" } else { "" }
 }
 
 pub(crate) fn warnings(path: &Path, remarks: &[ImportRemark]) -> Vec<String> {
@@ -173,9 +180,6 @@ impl Registry {
         to_reference: Option<ReferenceState>,
         efficiencies: (Option<EfficiencyDefinition>, Option<EfficiencyDefinition>),
     ) -> Result<MapWork, SessionError> {
-        let format = out.format(self)?;
-        let file = out.path.display();
-        let note = |fitted| if fitted { "; the format is a table, so the map was fitted" } else { "" };
         match self.read_map_file(path, user_description)? {
             MapFile::Compressor(imported) => {
                 let mut map = imported.map;
@@ -188,24 +192,7 @@ impl Registry {
                     (None, Some(_)) => return Err(MapWorkError::NoDefinition.into()),
                     (_, None) => map.efficiency = efficiency,
                 }
-                let (map, fitted_here) = write_map_fitted_if_needed(out.path, format, map, out.existing)?;
-                let points: usize = map.lines.iter().map(|line| line.points.len()).sum();
-                let (lines, reference) = (map.lines.len(), map.reference);
-                let mut document = Document::default();
-                document.text(format!(
-                    "{file}: {}, {points} points on {lines} speed lines, corrected to {reference}{}",
-                    format.name,
-                    note(fitted_here)
-                ));
-                let json = json!({
-                    "file": out.path,
-                    "format": format.name,
-                    "reference": reference,
-                    "efficiency": map.efficiency,
-                    "lines": lines,
-                    "points": points,
-                    "fitted": map.fitted.is_some(),
-                });
+                let (document, json) = self.write_derived(map, out)?;
                 Ok(MapWork { document, json, warnings: warnings(path, &imported.remarks) })
             }
             MapFile::Turbine(imported) => {
@@ -216,13 +203,15 @@ impl Registry {
                 if let Some((_, property)) = requested.into_iter().find(|(requested, _)| *requested) {
                     return Err(MapWorkError::NotOfTurbine { path: path.to_owned(), property }.into());
                 }
+                let format = out.format(self)?;
                 let (map, fitted_here) = write_turbine_fitted_if_needed(path, out, format, imported.map)?;
                 let (points, lines) = (map.points.len(), map.lines().count());
                 let mut document = Document::default();
                 document.text(format!(
-                    "{file}: {}, turbine, {points} points on {lines} speed lines{}",
+                    "{}: {}, turbine, {points} points on {lines} speed lines{}",
+                    out.path.display(),
                     format.name,
-                    note(fitted_here)
+                    fitted_note(fitted_here)
                 ));
                 let json = json!({
                     "file": out.path,
@@ -235,6 +224,68 @@ impl Registry {
                 Ok(MapWork { document, json, warnings: warnings(path, &imported.remarks) })
             }
         }
+    }
+
+    /// Writes a map with its quantities multiplied.
+    pub fn scale_map_file(
+        &self,
+        (path, user_description): (&Path, &MapDescription),
+        scale: MapScale,
+        out: MapOut<'_>,
+    ) -> Result<MapWork, SessionError> {
+        let imported = self.inspect_map(path, user_description)?;
+        let map =
+            scaled(imported.map, scale).map_err(|source| MapWorkError::NotScaled(path.to_owned(), source))?;
+        let (mut document, mut json) = self.write_derived(map, out)?;
+        document.text(format!(
+            "Flow times {:.4}, PR - 1 times {:.4}, efficiency times {:.4}, speed times {:.4}. The intervals are those of the points, in proportion; \
+             the error of the scaling is not in them.",
+            scale.flow, scale.pressure_ratio, scale.efficiency, scale.speed
+        ));
+        json["scale"] = serde_json::to_value(scale)?;
+        Ok(MapWork { document, json, warnings: warnings(path, &imported.remarks) })
+    }
+
+    /// Writes two maps of one machine as one.
+    pub fn merge_map_files(
+        &self,
+        [first, second]: [(&Path, &MapDescription); 2],
+        out: MapOut<'_>,
+    ) -> Result<MapWork, SessionError> {
+        let maps = [self.inspect_map(first.0, first.1)?, self.inspect_map(second.0, second.1)?];
+        let merged = merge(&maps[0].map, &maps[1].map);
+        let mut document = merged.document();
+        let (lines, seam) = (serde_json::to_value(&merged.lines)?, serde_json::to_value(&merged.seam)?);
+        let (written, mut json) = self.write_derived(merged.map, out)?;
+        document.append(written);
+        (json["of_lines"], json["seam"]) = (lines, seam);
+        let warnings = [warnings(first.0, &maps[0].remarks), warnings(second.0, &maps[1].remarks)].concat();
+        Ok(MapWork { document, json, warnings })
+    }
+
+    /// Writes a compressor map, fitted first if the format needs it, and says what was written.
+    fn write_derived(&self, map: CompressorMap, out: MapOut<'_>) -> Result<(Document, Value), SessionError> {
+        let format = out.format(self)?;
+        let (map, fitted_here) = write_map_fitted_if_needed(out.path, format, map, out.existing)?;
+        let points: usize = map.lines.iter().map(|line| line.points.len()).sum();
+        let (lines, reference) = (map.lines.len(), map.reference);
+        let mut document = Document::default();
+        document.text(format!(
+            "{}: {}, {points} points on {lines} speed lines, corrected to {reference}{}",
+            out.path.display(),
+            format.name,
+            fitted_note(fitted_here)
+        ));
+        let json = json!({
+            "file": out.path,
+            "format": format.name,
+            "reference": reference,
+            "efficiency": map.efficiency,
+            "lines": lines,
+            "points": points,
+            "fitted": map.fitted.is_some(),
+        });
+        Ok((document, json))
     }
 
     /// Compares two maps of the same machine. `picture` is a new file that shows both.

@@ -178,6 +178,9 @@ impl From<BlindError> for Failure {
             BlindError::Content { .. }
             | BlindError::TooLarge { .. }
             | BlindError::Seal { .. }
+            | BlindError::UnknownCause { .. }
+            | BlindError::CauseRange { .. }
+            | BlindError::CauseParameters { .. }
             | BlindError::Cases { .. } => Code::BadInput,
             _ => Code::Failure,
         };

@@ -47,6 +47,12 @@ pub enum BlindError {
     Signatures { source: Box<dyn std::error::Error + Send + Sync> },
     #[error("{cases} cases were requested; 1 to {max} are allowed")]
     Cases { cases: usize, max: usize },
+    #[error("no effect is called {id}; those of the library are {known}. Give another cause as a sentence")]
+    UnknownCause { id: String, known: String },
+    #[error("{id} takes {low} to {high} {unit}, but {value} was given")]
+    CauseRange { id: String, value: f64, low: f64, high: f64, unit: String },
+    #[error("{id} has the parameters {parameters}; give a value for each")]
+    CauseParameters { id: String, parameters: String },
 }
 
 impl BlindError {
@@ -399,13 +405,7 @@ impl Truth {
                             info.description, parameter.name, parameter.unit
                         ))
                     }
-                    ([_], [value]) => json!(value),
-                    (parameters, values) => parameters
-                        .iter()
-                        .zip(values)
-                        .map(|(parameter, value)| (parameter.name.to_string(), json!(value)))
-                        .collect::<Map<String, Value>>()
-                        .into(),
+                    (parameters, values) => strengths(parameters, values),
                 };
                 (info.id.to_string(), value)
             })
@@ -413,6 +413,18 @@ impl Truth {
         let ids = case.causes.iter().map(|cause| cause.effect.info().id.to_string());
         let sigmas = ids.zip(case.sigmas.iter().copied()).collect();
         Truth { name: case.name.clone(), effects, sigmas, points }
+    }
+}
+
+/// A number, or an object with one number per parameter.
+pub(crate) fn strengths(parameters: &[EffectParameter], values: &[f64]) -> Value {
+    match values {
+        [value] => json!(value),
+        values => {
+            let named =
+                parameters.iter().zip(values).map(|(one, value)| (one.name.to_string(), json!(value)));
+            named.collect::<Map<String, Value>>().into()
+        }
     }
 }
 

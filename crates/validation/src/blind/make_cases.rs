@@ -1,16 +1,17 @@
 //! Makes a directory of cases: recordings, and sealed answers whose hash is printed before the diagnosis.
 
 use crate::blind::calibration::visibility;
-use crate::blind::cases::{BlindError, Case, Draw, Laboratory, Truth};
+use crate::blind::cases::{BlindError, Case, Draw, Laboratory, Truth, strengths};
 use crate::blind::outside::outside_kinds;
 use crate::blind::virtual_runs::Schedule;
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_fleet::Hash;
 use mapper_numerics::parallel;
-use mapper_physics::rig::effect::Effect;
+use mapper_physics::rig::effect::{Effect, EffectParameter};
 use mapper_recording::RecordingHeader;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
@@ -75,6 +76,66 @@ pub fn record(
 ) -> Result<Truth, BlindError> {
     let nominal = nominal_model(campaign)?;
     Schedule::new(campaign, &nominal)?.on(laboratory).run(case, file, &header(campaign))
+}
+
+/// Key of a cause that the library does not have, with a sentence.
+pub const OUTSIDE_NAME: &str = "outside_catalogue";
+
+/// What somebody builds into a rig; nothing at all is a rig as it is.
+#[derive(Debug, Clone, Copy)]
+pub struct Planted<'a> {
+    /// Name of the case.
+    pub name: &'a str,
+    /// Id of an effect, the parameter if it has several, and its value in the parameter's unit.
+    pub causes: &'a [(String, Option<String>, f64)],
+    /// A sentence on a cause that the library does not have.
+    pub outside: Option<&'a str>,
+}
+
+/// Seals causes of `catalogue` and others before the rig is recorded, as a case without a recording.
+pub fn plant(
+    campaign: &Campaign,
+    catalogue: &[Arc<dyn Effect>],
+    Planted { name, causes, outside }: Planted<'_>,
+    directory: &Path,
+) -> Result<Manifest, BlindError> {
+    let ids = || catalogue.iter().map(|effect| effect.info());
+    let mut effects = serde_json::Map::new();
+    for (id, _, _) in causes {
+        let info = ids().find(|info| info.id == *id).ok_or_else(|| BlindError::UnknownCause {
+            id: id.clone(),
+            known: ids().map(|info| info.id.as_ref()).collect::<Vec<_>>().join(", "),
+        })?;
+        let given = |parameter: &EffectParameter| {
+            let is_meant = |name: &Option<String>| match name {
+                Some(name) => *name == parameter.name,
+                None => info.parameters.len() == 1,
+            };
+            causes.iter().find(|(other, name, _)| other == id && is_meant(name)).map(|(_, _, value)| *value)
+        };
+        let values: Option<Vec<f64>> = info.parameters.iter().map(given).collect();
+        let count = causes.iter().filter(|(other, _, _)| other == id).count();
+        let values = values.filter(|values| values.len() == count).ok_or_else(|| {
+            let names: Vec<&str> = info.parameters.iter().map(|parameter| parameter.name.as_ref()).collect();
+            BlindError::CauseParameters { id: id.clone(), parameters: names.join(", ") }
+        })?;
+        for (parameter, value) in info.parameters.iter().zip(&values) {
+            if !(parameter.low..=parameter.high).contains(value) {
+                return Err(BlindError::CauseRange {
+                    id: id.clone(),
+                    value: *value,
+                    low: parameter.low,
+                    high: parameter.high,
+                    unit: parameter.unit.to_string(),
+                });
+            }
+        }
+        effects.insert(id.clone(), strengths(&info.parameters, &values));
+    }
+    effects.extend(outside.map(|sentence| (OUTSIDE_NAME.to_owned(), sentence.into())));
+    let answer = Truth { name: name.to_owned(), effects, sigmas: BTreeMap::new(), points: Vec::new() };
+    std::fs::create_dir_all(directory).map_err(BlindError::file(directory))?;
+    seal(&campaign.name, Laboratory::default(), false, &[answer], directory)
 }
 
 /// Writes answers and the manifest with their hash into a directory that has neither.

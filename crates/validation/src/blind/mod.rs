@@ -16,6 +16,6 @@ pub use crate::blind::cases::{
 };
 pub use crate::blind::make_cases::{ANSWERS_NAME, MANIFEST_NAME, Manifest};
 pub use cases::BlindError;
-pub use make_cases::{CreatedCases, draw_cases, make, record, seal};
+pub use make_cases::{CreatedCases, Planted, draw_cases, make, plant, record, seal};
 pub use outside::{OutsideUse, outside_kinds};
 pub use reliability::{Share, clopper_pearson_95};

@@ -1,7 +1,7 @@
 //! Scores diagnoses against the opened answers, and writes the score as text.
 
 use crate::blind::cases::{BlindError, CaseKind, Truth};
-use crate::blind::make_cases::{MANIFEST_NAME, Manifest, open, read_json};
+use crate::blind::make_cases::{MANIFEST_NAME, Manifest, OUTSIDE_NAME, open, read_json};
 use crate::blind::reliability::Share;
 use mapper_effects::catalogue;
 use mapper_numerics::statistics::{mean, nearest_rank};
@@ -173,7 +173,7 @@ pub fn open_answers(directory: &Path) -> Result<usize, BlindError> {
 }
 
 fn kind_of(truth: &Truth) -> CaseKind {
-    if truth.effects.keys().any(|id| id.starts_with("X_") || id == "outside_catalogue") {
+    if truth.effects.keys().any(|id| id.starts_with("X_") || id == OUTSIDE_NAME) {
         return CaseKind::Outside;
     }
     match truth.effects.len() {

@@ -5,7 +5,7 @@ use mapper_campaign::Campaign;
 use mapper_core::Channel;
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_validation::blind::{
-    ANSWERS_NAME, BlindError, CreatedCases, Draw, OutsideUse, Share, Truth, make, score,
+    ANSWERS_NAME, BlindError, CreatedCases, Draw, OutsideUse, Planted, Share, Truth, make, plant, score,
 };
 use serde_json::json;
 use std::path::Path;
@@ -112,4 +112,41 @@ fn oracle(truth: &Truth) -> serde_json::Value {
         "probability_outside": if outside { 1.0 } else { 0.0 },
         "gap": {"gap_reduction": 1.0},
     })
+}
+
+/// What was planted is what the score holds the diagnosis to; an effect, a parameter or a size that nothing can have is not sealed.
+#[test]
+fn a_planted_cause_is_sealed_and_scored() {
+    let scratch = tempfile::tempdir().unwrap();
+    let (campaign, catalogue) = (campaign(), mapper_effects::catalogue());
+    let cause =
+        |id: &str, parameter: Option<&str>, value| (id.to_owned(), parameter.map(str::to_owned), value);
+    let sealed = |name: &str, causes: &[(String, Option<String>, f64)], outside| {
+        plant(&campaign, &catalogue, Planted { name: "night", causes, outside }, &scratch.path().join(name))
+    };
+    let refused = |causes: &[_]| sealed("refused", causes, None).unwrap_err();
+    assert!(matches!(refused(&[cause("valve_aera", None, 1.05)]), BlindError::UnknownCause { .. }));
+    assert!(matches!(refused(&[cause("valve_area", None, 3.0)]), BlindError::CauseRange { .. }));
+    assert!(matches!(refused(&[cause("valve_area", None, f64::NAN)]), BlindError::CauseRange { .. }));
+    assert!(matches!(refused(&[cause("inner_node", Some("phi"), 0.3)]), BlindError::CauseParameters { .. }));
+    assert!(!scratch.path().join("refused").exists());
+    let one = [cause("valve_area", None, 1.05)];
+    let wall = [cause("inner_node", Some("phi"), 0.3), cause("inner_node", Some("G"), 15.0)];
+    let scored = |name: &str| score::score(&scratch.path().join(name)).unwrap();
+    for (name, causes) in [("one", &one[..]), ("wall", &wall[..])] {
+        let manifest = sealed(name, causes, None).unwrap();
+        assert_eq!(manifest.cases, ["night"]);
+        let id = &causes[0].0;
+        let parameter = if causes.len() == 1 { json!(1.05) } else { json!({"phi": 0.3, "G": 15.0}) };
+        let answers = std::fs::read(scratch.path().join(name).join(ANSWERS_NAME)).unwrap();
+        let answers: serde_json::Value = serde_json::from_slice(&answers).unwrap();
+        assert_eq!(answers[0]["effects"], json!({ id.as_str(): parameter }));
+        // Without a diagnosis it is wrong, and of one cause.
+        assert_eq!((scored(name).single.hits, scored(name).single.trials), (0, 1));
+    }
+    sealed("outside", &[], Some("a heater of 40 W on the outlet duct")).unwrap();
+    assert_eq!(scored("outside").outside.trials, 1);
+    sealed("none", &[], None).unwrap();
+    assert_eq!(scored("none").none.trials, 1);
+    assert!(sealed("none", &[], None).is_err(), "a seal is not replaced");
 }

@@ -1,6 +1,6 @@
 //! `mapper gap blind`: diagnoses of cases whose causes are withheld.
 
-use crate::command_line::subcommands;
+use crate::command_line::{key_and_value, subcommands};
 use crate::environment::registry;
 use crate::interrupt;
 use crate::output::failure::{Code, Failure};
@@ -10,7 +10,9 @@ use mapper_fleet::{Engine, cores};
 use mapper_report::{Document, Table};
 use mapper_session::write_new;
 use mapper_validation::blind::score::{open_answers, score};
-use mapper_validation::blind::{CaseKind, Draw, Laboratory, MANIFEST_NAME, Manifest, OutsideUse};
+use mapper_validation::blind::{
+    ANSWERS_NAME, CaseKind, Draw, Laboratory, MANIFEST_NAME, Manifest, OutsideUse, Planted, plant,
+};
 use serde_json::json;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -25,6 +27,7 @@ pub struct Blind {
 
 subcommands! { BlindCommand:
     Make,
+    Plant,
     Run,
     Score,
 }
@@ -102,6 +105,62 @@ impl Make {
             made.manifest.cases.len(),
             self.out.display(),
             made.manifest.answers_sha256,
+        ))
+    }
+}
+
+/// Seal what somebody builds into a real rig, before it is recorded, and print the seal; the recording is then copied to DIR/NAME.mcap
+#[derive(Debug, Args)]
+pub struct Plant {
+    /// Directory for the case
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Name of the case
+    #[arg(long, value_name = "NAME", default_value = "rig", value_parser = case_name)]
+    pub name: String,
+    /// An effect of the library and its size in the unit of `mapper gap effects`, e.g. `valve_area=1.05`, `inner_node.phi=0.3`; may be repeated
+    #[arg(long = "cause", value_name = "EFFECT=VALUE", value_parser = cause)]
+    causes: Vec<(String, Option<String>, f64)>,
+    /// A cause that no effect of the library describes, as a sentence
+    #[arg(long, value_name = "TEXT")]
+    pub outside: Option<String>,
+    /// Campaign that the rig is recorded with (YAML)
+    #[arg(long, value_name = "FILE", default_value = "campaigns/gap_rig.yaml")]
+    pub campaign: PathBuf,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn case_name(text: &str) -> Result<String, String> {
+    let is_plain = !text.is_empty() && text.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
+    if is_plain { Ok(text.to_owned()) } else { Err("letters, digits, _ and -, e.g. `night_1`".to_owned()) }
+}
+
+fn cause(text: &str) -> Result<(String, Option<String>, f64), String> {
+    let (key, value) = key_and_value(text)?;
+    let value =
+        value.trim().parse().map_err(|_| format!("`{value}` is not a number, e.g. `valve_area=1.05`"))?;
+    Ok(match key.split_once('.') {
+        Some((id, parameter)) => (id.to_owned(), Some(parameter.to_owned()), value),
+        None => (key, None, value),
+    })
+}
+
+impl Plant {
+    pub fn run(&self) -> Result<(), Failure> {
+        let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
+        let case = Planted { name: &self.name, causes: &self.causes, outside: self.outside.as_deref() };
+        let manifest = plant(&campaign, &registry().effects, case, &self.out)?;
+        if self.json {
+            return standard_output::print_json(&manifest);
+        }
+        standard_output::print(&format!(
+            "SHA-256 of the answer: {}
+Keep {} from whoever diagnoses until `mapper gap blind score`.
+",
+            manifest.answers_sha256,
+            self.out.join(ANSWERS_NAME).display()
         ))
     }
 }

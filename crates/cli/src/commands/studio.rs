@@ -35,7 +35,8 @@ impl Studio {
     pub fn run(&self) -> Result<(), Failure> {
         // The history would make it, and a mistyped name would show an empty catalogue.
         if !self.directory.is_dir() {
-            let message = format!("{} is not a directory; name one with run folders", self.directory.display());
+            let message =
+                format!("{} is not a directory; name one with run folders", self.directory.display());
             return Err(Failure::new(Code::BadInput, message));
         }
         let path = self.db.clone().unwrap_or_else(|| self.directory.join("history.db"));

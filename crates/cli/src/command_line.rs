@@ -109,7 +109,7 @@ const TASKS: &[(&str, &[&str])] = &[
     ("Measure", &["run", "rig", "backend"]),
     ("From recordings to a map", &["log", "identify", "report", "map", "transient"]),
     ("Compare rig and model", &["gap", "drift"]),
-    ("Many runs", &["nightly", "history", "fleet", "reproduce"]),
+    ("Many runs", &["studio", "nightly", "history", "fleet", "reproduce"]),
     ("Shell", &["completions", "man", "help"]),
 ];
 

@@ -181,98 +181,116 @@ impl History {
         transaction.commit().map_err(fail)
     }
 
+    /// Reads, with the errors of this file.
+    pub(crate) fn read<T>(
+        &self,
+        read: impl FnOnce(&Connection) -> rusqlite::Result<T>,
+    ) -> Result<T, HistoryError> {
+        read(&self.connection).map_err(|source| HistoryError::of_sqlite(&self.path, source))
+    }
+
+    /// Writes in one transaction.
+    pub(crate) fn change<T>(
+        &mut self,
+        write: impl FnOnce(&Transaction<'_>) -> rusqlite::Result<T>,
+    ) -> Result<T, HistoryError> {
+        let transaction = self.connection.transaction_with_behavior(TransactionBehavior::Immediate);
+        let written = transaction.and_then(|transaction| {
+            let written = write(&transaction)?;
+            transaction.commit()?;
+            Ok(written)
+        });
+        written.map_err(|source| HistoryError::of_sqlite(&self.path, source))
+    }
+
     /// Compares a night with the band of the last `nights` and appends it, in one transaction, at its start time or the next free millisecond.
     pub fn append(&mut self, night: &mut Night, nights: usize) -> Result<Comparison, HistoryError> {
-        let path = self.path.clone();
-        self.try_append(night, nights).map_err(|source| HistoryError::of_sqlite(&path, source))
+        self.change(|transaction| append(transaction, night, nights))
     }
-
-    fn try_append(&mut self, night: &mut Night, nights: usize) -> rusqlite::Result<Comparison> {
-        let transaction = self.connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-        let mut same_start = transaction.prepare("SELECT 1 FROM night WHERE started_ms = ?1")?;
-        while same_start.exists([night.started_ms])? {
-            night.started_ms += 1;
-        }
-        drop(same_start);
-        let earlier = read_earlier_runs(&transaction, &night.name, nights)?;
-        let mut comparison = compare(night, &earlier);
-        let stored: i64 =
-            transaction
-                .query_row("SELECT count(*) FROM night WHERE name = ?1", [&night.name], |row| row.get(0))?;
-        comparison.stored_nights = usize::try_from(stored).unwrap_or_default();
-        let moved = !comparison.is_quiet() && !night.accepted;
-        transaction.execute(
-            "INSERT INTO night (name, started_ms, duration_s, program, accepted, moved) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
-            params![night.name, night.started_ms, night.duration_s, night.program, night.accepted, moved],
-        )?;
-        let night_id = transaction.last_insert_rowid();
-        {
-            let mut insert_run = transaction.prepare(&insert_run())?;
-            let mut insert_point =
-                transaction.prepare("INSERT INTO point VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?;
-            for run in &night.runs {
-                let RunKey { campaign, machine, method, seed } = &run.key;
-                let mut values: Vec<rusqlite::types::Value> = vec![
-                    night_id.into(),
-                    campaign.clone().into(),
-                    machine.clone().into(),
-                    method.clone().into(),
-                    // SQLite integers are signed; the bits are preserved.
-                    seed.cast_signed().into(),
-                    run.campaign_sha256.clone().into(),
-                    run.model_sha256.clone().into(),
-                    run.failure.clone().into(),
-                ];
-                values.extend(Metric::ALL.map(|figure| finite(run.figures.get(&figure).copied()).into()));
-                insert_run.execute(rusqlite::params_from_iter(values))?;
-                let run_id = transaction.last_insert_rowid();
-                for point in &run.points {
-                    insert_point.execute(params![
-                        run_id,
-                        point.speed_rpm,
-                        point.valve_opening_ratio,
-                        i64::try_from(point.visit).unwrap_or(i64::MAX),
-                        finite(point.eta),
-                        finite(point.eta_true),
-                        finite(point.h_w_m2k),
-                        finite(point.h_true_w_m2k),
-                    ])?;
-                }
-            }
-        }
-        transaction.commit()?;
-        Ok(comparison)
-    }
-
     /// Runs, oldest night first, without their points.
     pub fn runs(&self, filter: &Filter) -> Result<Vec<ListedRun>, HistoryError> {
-        self.try_runs(filter).map_err(|source| HistoryError::of_sqlite(&self.path, source))
+        self.read(|connection| runs(connection, filter))
     }
+}
 
-    fn try_runs(&self, filter: &Filter) -> rusqlite::Result<Vec<ListedRun>> {
-        let mut statement = self.connection.prepare(&format!(
-            "SELECT n.id, n.name, n.started_ms, n.duration_s, n.program, n.accepted, n.moved, {RUN_COLUMNS}, {} \
+fn runs(connection: &Connection, filter: &Filter) -> rusqlite::Result<Vec<ListedRun>> {
+    let mut statement = connection.prepare(&format!(
+        "SELECT n.id, n.name, n.started_ms, n.duration_s, n.program, n.accepted, n.moved, {RUN_COLUMNS}, {} \
              FROM run r JOIN night n ON n.id = r.night_id \
              WHERE (?1 IS NULL OR r.machine = ?1 OR r.campaign = ?1) AND (?2 IS NULL OR r.method = ?2) \
                AND (?3 IS NULL OR n.started_ms >= ?3) \
              ORDER BY n.started_ms, n.id, r.id",
-            figure_columns("r.")
-        ))?;
-        statement
-            .query_map(params![filter.machine, filter.method, filter.since_ms], |row| {
-                let night = StoredNight {
-                    id: row.get(0)?,
-                    name: row.get(1)?,
-                    started_ms: row.get(2)?,
-                    duration_s: row.get(3)?,
-                    program: row.get(4)?,
-                    accepted: row.get(5)?,
-                    moved: row.get(6)?,
-                };
-                Ok(ListedRun { night, run: read_run_row(row, 7)? })
-            })?
-            .collect()
+        figure_columns("r.")
+    ))?;
+    statement
+        .query_map(params![filter.machine, filter.method, filter.since_ms], |row| {
+            let night = StoredNight {
+                id: row.get(0)?,
+                name: row.get(1)?,
+                started_ms: row.get(2)?,
+                duration_s: row.get(3)?,
+                program: row.get(4)?,
+                accepted: row.get(5)?,
+                moved: row.get(6)?,
+            };
+            Ok(ListedRun { night, run: read_run_row(row, 7)? })
+        })?
+        .collect()
+}
+
+fn append(transaction: &Transaction<'_>, night: &mut Night, nights: usize) -> rusqlite::Result<Comparison> {
+    let mut same_start = transaction.prepare("SELECT 1 FROM night WHERE started_ms = ?1")?;
+    while same_start.exists([night.started_ms])? {
+        night.started_ms += 1;
     }
+    drop(same_start);
+    let earlier = read_earlier_runs(transaction, &night.name, nights)?;
+    let mut comparison = compare(night, &earlier);
+    let stored: i64 =
+        transaction
+            .query_row("SELECT count(*) FROM night WHERE name = ?1", [&night.name], |row| row.get(0))?;
+    comparison.stored_nights = usize::try_from(stored).unwrap_or_default();
+    let moved = !comparison.is_quiet() && !night.accepted;
+    transaction.execute(
+            "INSERT INTO night (name, started_ms, duration_s, program, accepted, moved) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+            params![night.name, night.started_ms, night.duration_s, night.program, night.accepted, moved],
+        )?;
+    let night_id = transaction.last_insert_rowid();
+    {
+        let mut insert_run = transaction.prepare(&insert_run())?;
+        let mut insert_point =
+            transaction.prepare("INSERT INTO point VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?;
+        for run in &night.runs {
+            let RunKey { campaign, machine, method, seed } = &run.key;
+            let mut values: Vec<rusqlite::types::Value> = vec![
+                night_id.into(),
+                campaign.clone().into(),
+                machine.clone().into(),
+                method.clone().into(),
+                // SQLite integers are signed; the bits are preserved.
+                seed.cast_signed().into(),
+                run.campaign_sha256.clone().into(),
+                run.model_sha256.clone().into(),
+                run.failure.clone().into(),
+            ];
+            values.extend(Metric::ALL.map(|figure| finite(run.figures.get(&figure).copied()).into()));
+            insert_run.execute(rusqlite::params_from_iter(values))?;
+            let run_id = transaction.last_insert_rowid();
+            for point in &run.points {
+                insert_point.execute(params![
+                    run_id,
+                    point.speed_rpm,
+                    point.valve_opening_ratio,
+                    i64::try_from(point.visit).unwrap_or(i64::MAX),
+                    finite(point.eta),
+                    finite(point.eta_true),
+                    finite(point.h_w_m2k),
+                    finite(point.h_true_w_m2k),
+                ])?;
+            }
+        }
+    }
+    Ok(comparison)
 }
 
 fn read_layout(connection: &Connection) -> rusqlite::Result<(i32, i32)> {

@@ -1,6 +1,5 @@
 //! The state that a browser shows, with a size limit for any run, and how events change it.
 
-use crate::server::OperatorCommand;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{Channel, IdentifiedPoint, Plan, PlanStep, SignalGuard, StepMarker, valve_area_text};
@@ -95,6 +94,15 @@ const TICK: Duration = Duration::from_millis(200);
 /// Channels with a chart of the last minutes.
 const TRACED: [Channel; 6] =
     [Channel::T2, Channel::Tc, Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P2, Channel::P3];
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum OperatorCommand {
+    Hold,
+    Continue,
+    /// Stop the run at the end of the step.
+    StopAfterStep,
+    SafeNow,
+}
 
 /// The run and its stop flags.
 pub struct LiveRun<'a> {

@@ -1,9 +1,15 @@
 //! TLS for the page, with a certificate from the operator.
 
-use std::io::{Read, Write};
-use std::net::TcpStream;
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::Duration;
+use tokio::io::{AsyncRead, AsyncWrite};
+
+/// Maximum time for the head of a request, or for the first words of TLS.
+pub(crate) const HEAD_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// A connection, encrypted or not.
+pub(crate) trait Stream: AsyncRead + AsyncWrite + Send {}
+impl<S: AsyncRead + AsyncWrite + Send> Stream for S {}
 
 /// PEM files of the server.
 #[derive(Debug, Clone)]
@@ -27,31 +33,6 @@ pub enum TlsError {
     NotBuilt,
 }
 
-/// A connection with a deadline for its request, so that a slow sender does not keep its slot.
-pub(crate) struct DeadlineStream {
-    pub(crate) stream: TcpStream,
-    pub(crate) until: Instant,
-}
-
-impl Read for DeadlineStream {
-    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
-        if Instant::now() > self.until {
-            return Err(std::io::ErrorKind::TimedOut.into());
-        }
-        self.stream.read(into)
-    }
-}
-
-impl Write for DeadlineStream {
-    fn write(&mut self, from: &[u8]) -> std::io::Result<usize> {
-        self.stream.write(from)
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        self.stream.flush()
-    }
-}
-
 #[cfg(feature = "tls")]
 pub(crate) use with::{Tls, read};
 #[cfg(not(feature = "tls"))]
@@ -59,13 +40,17 @@ pub(crate) use without::{Tls, read};
 
 #[cfg(feature = "tls")]
 mod with {
-    use super::{DeadlineStream, TlsError, TlsFiles};
-    use rustls::crypto::ring;
-    use rustls::pki_types::pem::PemObject;
-    use rustls::pki_types::{CertificateDer, PrivateKeyDer};
-    use rustls::{ServerConfig, ServerConnection, StreamOwned};
-    use std::io::Write;
+    use super::{HEAD_TIMEOUT, Stream, TlsError, TlsFiles};
+    use std::pin::Pin;
     use std::sync::Arc;
+    use tokio::net::TcpStream;
+    use tokio::time::timeout;
+    use tokio_rustls::LazyConfigAcceptor;
+    use tokio_rustls::rustls::crypto::ring;
+    use tokio_rustls::rustls::pki_types::pem::PemObject;
+    use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
+    use tokio_rustls::rustls::server::Acceptor;
+    use tokio_rustls::rustls::{Error, ServerConfig};
 
     /// Maximum size of a certificate chain or key, bytes: a certificate has some kilobytes, a chain some certificates.
     const MAX_PEM_BYTES: usize = 1 << 20;
@@ -77,7 +62,7 @@ mod with {
         let file =
             |path: &std::path::Path, what, why: String| TlsError::File { path: path.to_owned(), what, why };
         let certificate = |why| file(&files.certificate, "certificate", why);
-        let pair = |source: rustls::Error| TlsError::Pair { files: files.clone(), why: source.to_string() };
+        let pair = |source: Error| TlsError::Pair { files: files.clone(), why: source.to_string() };
         let read = |path| mapper_yaml::read_limited(path, MAX_PEM_BYTES).map_err(|source| source.to_string());
         let pem = read(&files.certificate).map_err(certificate)?;
         let chain: Vec<CertificateDer<'static>> = CertificateDer::pem_slice_iter(&pem)
@@ -98,26 +83,31 @@ mod with {
         Ok(Tls(Arc::new(config)))
     }
 
+    /// The alert that closes a connection (RFC 8446, 6): type 21, version 3.3, 2 bytes, a warning, `close_notify`.
+    const CLOSE_NOTIFY: [u8; 7] = [21, 3, 3, 0, 2, 1, 0];
+
     impl Tls {
-        /// Runs `answer` on a connection over TLS and closes it properly, so that the client knows that no data were cut off.
-        pub(crate) fn serve_over(
-            &self,
-            stream: DeadlineStream,
-            answer: impl FnOnce(&mut StreamOwned<ServerConnection, DeadlineStream>) -> std::io::Result<()>,
-        ) -> std::io::Result<()> {
-            let connection = ServerConnection::new(self.0.clone()).map_err(std::io::Error::other)?;
-            let mut stream = StreamOwned::new(connection, stream);
-            let answered = answer(&mut stream);
-            stream.conn.send_close_notify();
-            stream.flush()?;
-            answered
+        /// The connection over TLS; `None` if the client does not speak it, or not in time.
+        pub(crate) async fn accept(&self, stream: TcpStream) -> Option<Pin<Box<dyn Stream>>> {
+            let mut hello = LazyConfigAcceptor::new(Acceptor::default(), stream);
+            let accept = async { (&mut hello).await?.into_stream(self.0.clone()).await };
+            match timeout(HEAD_TIMEOUT, accept).await {
+                Ok(stream) => stream.ok().map(|stream| Box::pin(stream) as Pin<Box<dyn Stream>>),
+                Err(_) => {
+                    // So that the client knows that no data were cut off.
+                    let _ = hello.take_io().map(|stream| stream.try_write(&CLOSE_NOTIFY));
+                    None
+                }
+            }
         }
     }
 }
 
 #[cfg(not(feature = "tls"))]
 mod without {
-    use super::{DeadlineStream, TlsError, TlsFiles};
+    use super::{Stream, TlsError, TlsFiles};
+    use std::pin::Pin;
+    use tokio::net::TcpStream;
 
     /// Placeholder for builds without TLS.
     #[derive(Clone)]
@@ -128,11 +118,8 @@ mod without {
     }
 
     impl Tls {
-        pub(crate) fn serve_over(
-            &self,
-            _stream: DeadlineStream,
-            _answer: impl FnOnce(&mut DeadlineStream) -> std::io::Result<()>,
-        ) -> std::io::Result<()> {
+        #[allow(clippy::unused_async, reason = "as with TLS")]
+        pub(crate) async fn accept(&self, _stream: TcpStream) -> Option<Pin<Box<dyn Stream>>> {
             match *self {}
         }
     }

@@ -90,6 +90,22 @@ pub struct MapComparison {
     pub eta_differs_ratio: f64,
 }
 
+impl SpeedLineComparison {
+    /// Shares of its places where the lines, and where the efficiencies, differ beyond their 95 % interval; `None` without places.
+    pub fn differ_ratios(&self) -> Option<[f64; 2]> {
+        let count = (!self.places.is_empty()).then_some(self.places.len() as f64)?;
+        let differs = [PlaceComparison::line_differs, PlaceComparison::eta_differs];
+        Some(differs.map(|differs| self.places.iter().filter(|place| differs(place)).count() as f64 / count))
+    }
+}
+
+impl MapComparison {
+    /// The larger of the shares of places where lines or efficiencies differ.
+    pub fn differs_ratio(&self) -> f64 {
+        self.line_differs_ratio.max(self.eta_differs_ratio)
+    }
+}
+
 /// Compares the fits of two maps at every measured speed that both cover. The second map is converted to the first's reference state and,
 /// if both state one, to its definition of efficiency. Extrapolated places are left out.
 pub fn compare(first: &CompressorMap, second: &CompressorMap) -> Result<MapComparison, MapFitError> {

@@ -32,7 +32,7 @@ pub use channel_mapping::channel_map_yaml::ChannelMapError;
 pub use error::{BatchError, DamagedPart, ReadWarning, RecordError, StepsFound};
 pub use mapper_yaml::Findings;
 pub use mapper_yaml::units::{Kind, Unit, UnitError};
-pub use mcap::ChunkError;
+pub use mcap::{ChunkError, recording_program};
 pub use recording_reader::{ReadReport, read_marks, read_recording, read_recording_from};
 pub use scan::ReadOptions;
 pub use topics::{RecordingHeader, StepPhase};

@@ -6,6 +6,7 @@ use serde::de::{Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde_json::value::RawValue;
 use std::collections::BTreeMap;
 use std::io::Read;
+use std::path::Path;
 use std::{fmt, io};
 use zstd::zstd_safe::{DCtx, ResetDirective, get_error_name};
 
@@ -110,6 +111,23 @@ pub(crate) fn parse_attachment(record: &[u8]) -> Option<(String, &[u8])> {
 
 /// Bytes before a record's body. Source: MCAP, one of opcode, eight of length.
 const FRAME_BYTES: usize = 9;
+
+/// Program and version that wrote a recording; `None` if its header cannot be read.
+pub fn recording_program(path: &Path) -> Option<String> {
+    /// A header has two short texts, bytes. Bound: memory.
+    const MAX_HEADER_BYTES: u64 = 4096;
+    let mut start = mapper_yaml::open_file(path).ok()?.take(MAX_HEADER_BYTES);
+    let mut magic = vec![0; MAGIC.len()];
+    start.read_exact(&mut magic).ok().filter(|()| magic == MAGIC)?;
+    match FrameReader::new(start, MAGIC.len() as u64).next_frame().ok()? {
+        Frame::Record { opcode: op::HEADER, body, .. } => {
+            let mut body = Body(body);
+            let (_profile, library) = (body.text()?, body.text()?);
+            Some(library).filter(|library| !library.is_empty())
+        }
+        _ => None,
+    }
+}
 
 #[derive(Debug, PartialEq)]
 pub(crate) enum Frame<'a> {

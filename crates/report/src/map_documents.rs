@@ -148,12 +148,12 @@ impl Describe for MapComparison {
             "eta differs %",
         ];
         let mut table = Table::new(heads);
-        for line in &comparison.lines {
+        let mut lines: Vec<_> = comparison.lines.iter().map(|line| (line, line.differ_ratios())).collect();
+        // Where they differ at most places first; of equal ones, in order of speed.
+        let most = |ratios: Option<[f64; 2]>| ratios.map_or(-1.0, |[line, eta]| line.max(eta));
+        lines.sort_by(|(_, a), (_, b)| most(*b).total_cmp(&most(*a)));
+        for (line, ratios) in lines {
             let mean = |value: fn(&PlaceComparison) -> f64| mean(line.places.iter().map(value));
-            let share = |differs: fn(&PlaceComparison) -> bool| {
-                let count = line.places.iter().filter(|p| differs(p)).count();
-                (!line.places.is_empty()).then(|| 100.0 * count as f64 / line.places.len() as f64)
-            };
             table.row([
                 format!("{:.0}", line.speed_corrected_rpm),
                 line.places.len().to_string(),
@@ -163,8 +163,8 @@ impl Describe for MapComparison {
                 number(mean(|p| 100.0 * half_width_95(p.distance_standard_error_ratio)), 2),
                 number(mean(|p| 100.0 * p.eta_difference), 2),
                 number(mean(|p| 100.0 * half_width_95(p.eta_standard_error)), 2),
-                number(share(PlaceComparison::line_differs), 0),
-                number(share(PlaceComparison::eta_differs), 0),
+                number(ratios.map(|[line, _]| 100.0 * line), 0),
+                number(ratios.map(|[_, eta]| 100.0 * eta), 0),
             ]);
         }
         let mut document = Document::default();

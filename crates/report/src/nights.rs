@@ -1,9 +1,9 @@
 //! Nights and studies.
 
 use crate::document::{Describe, Document, Table};
-use crate::formatting::number;
+use crate::formatting::{Message, number};
 use mapper_fleet::{Cost, MergeOutcome, Status, Submission, UnfinishedItem};
-use mapper_history::{Comparison, ListedRun, Metric, Night, median};
+use mapper_history::{CataloguePage, CataloguedRun, Comparison, ListedRun, Metric, Night, median};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -118,6 +118,65 @@ pub fn listed_run_json(listed: &ListedRun) -> serde_json::Value {
         "campaign_sha256": run.campaign_sha256, "model_sha256": run.model_sha256,
         "failure": run.failure, "figures": figures,
     })
+}
+
+/// Names and values of a catalogued run, as every table of runs shows them; drift and +/- in points of efficiency.
+pub(crate) fn run_values(run: &CataloguedRun) -> [(&'static str, String); 13] {
+    let summary = &run.summary;
+    let known = |text: Option<&String>| text.map_or_else(|| "-".to_owned(), String::clone);
+    let [good, doubtful, unusable] = summary.points.map(|count| count.to_string());
+    let end = match (&summary.ending, summary.has_journal) {
+        _ if summary.problem.is_some() => "Cannot be read.".to_owned(),
+        (Some(ending), _) => ending.message(),
+        (None, true) => "Goes on, or was killed.".to_owned(),
+        (None, false) => "Identified from recordings.".to_owned(),
+    };
+    [
+        ("start (UTC)", known(summary.started.as_ref()).trim_end_matches(" UTC").to_owned()),
+        ("machine", summary.machine.clone()),
+        ("serial", known(summary.serial_number.as_ref())),
+        ("campaign", summary.campaign.clone()),
+        ("rig", summary.backend.clone()),
+        ("end", end),
+        ("good", good),
+        ("doubtful", doubtful),
+        ("unusable", unusable),
+        ("surges", summary.surges.map_or_else(|| "-".to_owned(), |surges| surges.to_string())),
+        ("drift", summary.drift.map_or_else(|| "-".to_owned(), |drift| format!("{:+.2}", 100.0 * drift))),
+        ("worst +/-", number(summary.worst_eta_half_width.map(|half| 100.0 * half), 2)),
+        ("tags", run.tags.join(", ")),
+    ]
+}
+
+/// Columns of [`run_values`] with text.
+pub(crate) const TEXT_COLUMNS: [usize; 6] = [1, 2, 3, 4, 5, 12];
+
+/// A table of runs; the last column is their folder.
+pub(crate) fn run_table<'a>(runs: impl IntoIterator<Item = &'a CataloguedRun>) -> Table {
+    let heads = run_values(&CataloguedRun::default()).map(|(head, _)| head).into_iter().chain(["folder"]);
+    let cells = |run: &CataloguedRun| {
+        let values = run_values(run).map(|(_, value)| value).into_iter();
+        values.chain([run.folder.clone()]).collect::<Vec<_>>()
+    };
+    Table::new(heads).with_texts(TEXT_COLUMNS.into_iter().chain([13])).rows(runs.into_iter().map(cells))
+}
+
+impl Describe for CataloguePage {
+    fn document(&self) -> Document {
+        let mut document = Document::default();
+        document.table(run_table(&self.runs));
+        for run in &self.runs {
+            document.text(
+                run.summary.problem.as_ref().map_or_else(String::new, |why| format!("{}: {why}", run.folder)),
+            );
+        }
+        document.text(format!(
+            "{} of {} catalogued runs; drift and +/- in points of efficiency.",
+            self.runs.len(),
+            self.all
+        ));
+        document
+    }
 }
 
 /// The changes of a night, and its size.

@@ -1,8 +1,8 @@
 //! Pictures of results: h over flow, error of efficiency over the change of T2, two maps compared, trends of the nightly runs.
 
 use mapper_chart::{
-    Axis, Colour, Dash, Figure, Figure as Picture, Line, LineEnd, Marker, Note, Panel, Rule, RuleAt, Scatter,
-    ScatterPoint, palette,
+    Axis, Colour, Dash, Figure, Figure as Picture, Line, LineEnd, MapDrawing, Marker, Note, Panel, Rule,
+    RuleAt, Scatter, ScatterPoint, palette,
 };
 use mapper_core::{CompressorMap, IdentifiedPoint, Verdict, half_width_95};
 use mapper_history::{ListedRun, Metric, median};
@@ -103,6 +103,34 @@ pub fn distinct_names(files: [&Path; 2]) -> [String; 2] {
         .unwrap_or_else(|| files.map(|path| path.display().to_string()));
     // A file compared with itself has one name.
     if first == second { [first, format!("{second} again")] } else { [first, second] }
+}
+
+/// The measured lines of several maps at the reference state of the first, each with its own colour and dash, and their efficiencies.
+pub fn maps_figure(maps: &[CompressorMap], names: &[&str]) -> Figure {
+    const DASHES: [Dash; 4] = [Dash::Solid, Dash::Dashed, Dash::Dotted, Dash::DashDot];
+    let flow = || Axis::new("corrected mass flow, kg/s");
+    let mut course = Panel::new(flow(), Axis::new("total pressure ratio P2/P1")).title("(a) speed lines");
+    let mut efficiency =
+        Panel::new(flow(), Axis::new("efficiency, %")).title("(b) efficiency on the speed lines");
+    let reference = maps.first().map(|map| map.reference);
+    for (index, (map, name)) in maps.iter().zip(names).enumerate() {
+        let map = reference.map_or_else(|| map.clone(), |reference| map.clone().at_reference(reference));
+        let line = |points| {
+            let dash = DASHES[index % DASHES.len()];
+            Line::new(points, COLOURS[index % COLOURS.len()]).dash(dash).label(*name)
+        };
+        for drawn in MapDrawing::new(&map).lines.iter().filter(|line| line.measured) {
+            let within = drawn.nodes.iter().filter(|node| !node.extrapolated).map(|node| node.place);
+            let speed = format!("{:.0}", drawn.speed_corrected_rpm / 1000.0);
+            let course_line = line(within.collect());
+            course.add(if index == 0 { course_line.end_label(speed, LineEnd::First) } else { course_line });
+            efficiency
+                .add(line(drawn.eta.iter().map(|at| (at.flow_corrected_kg_s, 100.0 * at.eta)).collect()));
+        }
+    }
+    let subtitle = reference.map(|state| format!("Corrected to {state}; numbers are speeds in krpm."));
+    let figure = Figure::new("Maps of the runs").subtitle(subtitle.unwrap_or_default());
+    figure.panel(course).panel(efficiency).panel_size_px(560.0, 460.0)
 }
 
 /// Points of both maps with the compared places, and the difference of efficiency with its 95 % interval.

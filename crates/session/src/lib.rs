@@ -27,6 +27,7 @@ pub use crate::errors::{
 pub use crate::machine::first_campaign::{FirstCampaignRequest, FirstRig};
 pub use crate::nightly::{DrawnMachine, NightlyRun};
 pub use crate::recording::files::{PROGRAM, program_and_commit};
+pub use analysis::catalogue::{RunFolder, compare_runs, index_runs};
 pub use analysis::diagnosis_file::{MadeFrom, diagnosis_of_run, found_in};
 pub use analysis::drift::Drift;
 pub use analysis::gap::Gap;

@@ -47,6 +47,7 @@ mod sources;
 mod speed_lines;
 mod step_numbers;
 mod stopped;
+mod studio;
 mod surge;
 mod terminal;
 mod tested;

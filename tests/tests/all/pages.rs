@@ -88,7 +88,7 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
 }
 
 /// Nine points of turbo_a with repeats, without a soak; the operator's name is markup.
-const NINE_POINTS: &[(&str, &str)] = &[
+pub(crate) const NINE_POINTS: &[(&str, &str)] = &[
     (
         "speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]",
         "speeds: [80 krpm, 110 krpm, 140 krpm]",
@@ -101,7 +101,7 @@ const NINE_POINTS: &[(&str, &str)] = &[
 ];
 
 /// The directory of a run of them.
-fn run_of_nine_points() -> std::path::PathBuf {
+pub(crate) fn run_of_nine_points() -> std::path::PathBuf {
     shared_run(&CampaignFile::shipped_with(NINE_POINTS)).run
 }
 

@@ -1,15 +1,15 @@
-//! `mapper history`: results of the nightly runs.
+//! `mapper history`: results of the nightly runs, and the catalogue of run folders.
 
 use crate::output::failure::Failure;
 use crate::output::standard_output::{self, FileOutput};
 use clap::Args;
-use mapper_history::{Filter, Metric};
-use mapper_report::{history_svg, listed_runs, night_groups};
-use mapper_session::{SessionError, night_report_link};
+use mapper_history::{CatalogueFilter, Filter, Metric};
+use mapper_report::{Describe, Document, history_svg, listed_runs, night_groups};
+use mapper_session::{SessionError, index_runs, night_report_link};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// List, filter and plot the results of the nightly runs
+/// List, filter and plot the results of the nightly runs, and list the catalogued run folders
 #[derive(Debug, Args)]
 pub struct History {
     /// The history
@@ -30,6 +30,12 @@ pub struct History {
     /// A row for each run, instead of the medians over the seeds
     #[arg(long)]
     pub runs: bool,
+    /// First catalogue every run folder below this directory
+    #[arg(long, value_name = "DIR")]
+    pub index: Option<PathBuf>,
+    /// Only catalogued runs with all of these words, and no nights
+    #[arg(long, value_name = "WORDS")]
+    pub find: Option<String>,
     /// Draw the trends into this new SVG file
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
@@ -67,8 +73,25 @@ impl History {
             method: self.method.clone(),
             since_ms: self.since.map(|since| since.as_millisecond()),
         };
-        let history = mapper_history::History::open_existing(&self.db);
-        let runs = history.and_then(|history| history.runs(&filter)).map_err(SessionError::from)?;
+        let open = if self.index.is_some() {
+            mapper_history::History::open
+        } else {
+            mapper_history::History::open_existing
+        };
+        let mut history = open(&self.db).map_err(SessionError::from)?;
+        if let Some(directory) = &self.index {
+            for (folder, why) in index_runs(directory, &mut history)? {
+                standard_output::say(&format!("{folder} cannot be read: {why}\n"));
+            }
+        }
+        let wanted = CatalogueFilter {
+            words: self.find.clone().unwrap_or_default(),
+            machine: self.machine.clone(),
+            ..CatalogueFilter::default()
+        };
+        let catalogue = history.catalogue(&wanted).map_err(SessionError::from)?;
+        let runs = if self.find.is_some() { Ok(Vec::new()) } else { history.runs(&filter) };
+        let runs = runs.map_err(SessionError::from)?;
         let figures: Vec<Metric> =
             if self.figure.is_empty() { DEFAULT_METRICS.to_vec() } else { self.figure.clone() };
         if let Some(path) = &self.svg {
@@ -77,12 +100,18 @@ impl History {
         }
         if self.output.json {
             let runs: Vec<serde_json::Value> = runs.iter().map(mapper_report::listed_run_json).collect();
-            return standard_output::print_json(&json!({"history": self.db, "runs": runs}));
+            return standard_output::print_json(&json!({
+                "history": self.db, "runs": runs, "catalogue": catalogue.runs,
+            }));
         }
-        standard_output::show(&if self.runs {
-            listed_runs(&runs, &figures)
-        } else {
-            night_groups(&runs, &figures)
-        })
+        let mut document = match (runs.is_empty() && catalogue.all > 0, self.runs) {
+            (true, _) => Document::default(),
+            (_, true) => listed_runs(&runs, &figures),
+            (_, false) => night_groups(&runs, &figures),
+        };
+        if catalogue.all > 0 {
+            document.append(catalogue.document());
+        }
+        standard_output::show(&document)
     }
 }

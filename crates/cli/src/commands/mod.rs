@@ -21,6 +21,7 @@ subcommands! { Command:
     drift::Drift,
     nightly::Nightly,
     history::History,
+    studio::Studio,
     fleet::Fleet,
     reproduce::Reproduce,
     map::Map,

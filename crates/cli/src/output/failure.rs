@@ -80,8 +80,14 @@ impl Failure {
 
     /// The live page is not available.
     pub fn of_live(error: LiveError) -> Self {
-        let command = matches!(error, LiveError::Listen(..)).then(|| "`--live=ADDRESS`".to_owned());
-        Failure::with_command(Code::Failure, &error, command)
+        match error {
+            LiveError::Session(error) => error.into(),
+            LiveError::Listen(..) => {
+                let command = "`run --live=ADDRESS`, `studio --address ADDRESS`".to_owned();
+                Failure::with_command(Code::Failure, &error, Some(command))
+            }
+            error => Failure::new(Code::Failure, error),
+        }
     }
 
     fn of_kind(error: Box<dyn std::error::Error + Send + Sync>) -> Self {

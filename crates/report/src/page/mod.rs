@@ -6,6 +6,8 @@
 
 pub(crate) mod drawn;
 pub(crate) mod run_page;
+pub(crate) mod studio;
 pub(crate) mod widgets;
 
 pub use run_page::{LiveMap, LivePoint, Planned, live_map, live_page, live_point, planned, target_line_name};
+pub use studio::{RunList, compare_page, sign_in_page, studio_message, studio_run_page};

@@ -25,6 +25,9 @@ const MAP: &str = include_str!("../../assets/map.js");
 const STEPS: &str = include_str!("../../assets/steps.js");
 const TABLES: &str = include_str!("../../assets/tables.js");
 const LIVE: &str = include_str!("../../assets/live.js");
+/// Takes the token behind the `#`, which no request carries.
+const SIGN_IN: &str = "const token = new URLSearchParams(location.hash.slice(1)).get('token');
+if (token) { const form = document.forms[0]; history.replaceState(null, '', '/'); form.elements.token.value = token; form.submit(); }";
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Purpose {
@@ -34,29 +37,36 @@ pub(crate) enum Purpose {
     Still,
     /// To watch a run: it makes requests only to the program that served it.
     Live,
+    /// A page of the workbench, without a script: its forms go to the program that served it.
+    Studio,
+    /// Where the workbench asks for its token.
+    SignIn,
 }
 
 impl Purpose {
     fn scripts(self) -> &'static [&'static str] {
         match self {
             Purpose::Kept => &[D3, PLOT, COMMON, MAP, STEPS, TABLES],
-            Purpose::Still => &[],
+            Purpose::Still | Purpose::Studio => &[],
+            Purpose::SignIn => &[SIGN_IN],
             Purpose::Live => &[D3, PLOT, COMMON, MAP, LIVE],
         }
     }
 
     fn policy(self) -> String {
         match self {
-            Purpose::Still => format!("{POLICY}; script-src 'none'"),
-            Purpose::Kept => format!("{POLICY}; {OWN_SCRIPT}"),
-            Purpose::Live => format!("{POLICY}; {OWN_SCRIPT}; connect-src 'self'"),
+            Purpose::Still => format!("{POLICY}; {NO_FORM}; script-src 'none'"),
+            Purpose::Kept => format!("{POLICY}; {NO_FORM}; {OWN_SCRIPT}"),
+            Purpose::Live => format!("{POLICY}; {NO_FORM}; {OWN_SCRIPT}; connect-src 'self'"),
+            Purpose::Studio => format!("{POLICY}; form-action 'self'; script-src 'none'"),
+            Purpose::SignIn => format!("{POLICY}; form-action 'self'; {OWN_SCRIPT}"),
         }
     }
 }
 
 /// No requests in or out.
-const POLICY: &str =
-    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'";
+const NO_FORM: &str = "form-action 'none'";
 const OWN_SCRIPT: &str = "script-src 'unsafe-inline'";
 
 /// The complete page; `footer` is printed on each sheet, `data` is the input of its script.
@@ -80,7 +90,7 @@ pub(crate) fn shell(
             }
             body {
                 (body)
-                @if purpose != Purpose::Still {
+                @if !matches!(purpose, Purpose::Still | Purpose::Studio) {
                     script type="application/json" id="data" { (PreEscaped(json_in_html(data)?)) }
                 }
                 @for script in purpose.scripts() { script { (PreEscaped(script)) } }

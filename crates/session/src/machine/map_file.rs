@@ -197,13 +197,19 @@ pub fn write_map_fitted_if_needed(
     map: CompressorMap,
     existing: Existing,
 ) -> Result<(CompressorMap, bool), SessionError> {
-    let needs_fit = map.fitted.is_none() && matches!(format.write(&map), Err(ExportError::NeedsFit { .. }));
-    let map = if needs_fit {
-        let options = MapFitOptions { leave_one_out: false, ..MapFitOptions::default() };
-        fit_map(map, &options).map_err(|source| SessionError::Fit(format.name, source))?
-    } else {
-        map
-    };
+    let (map, needs_fit) = fitted_if_needed(format, map)?;
     write_map(path, format, &map, existing)?;
     Ok((map, needs_fit))
+}
+
+/// The map, fitted if the format tabulates the whole map; whether it was fitted here.
+pub(crate) fn fitted_if_needed(
+    format: &MapFormat,
+    map: CompressorMap,
+) -> Result<(CompressorMap, bool), SessionError> {
+    if map.fitted.is_some() || !matches!(format.write(&map), Err(ExportError::NeedsFit { .. })) {
+        return Ok((map, false));
+    }
+    let options = MapFitOptions { leave_one_out: false, ..MapFitOptions::default() };
+    fit_map(map, &options).map(|map| (map, true)).map_err(|source| SessionError::Fit(format.name, source))
 }

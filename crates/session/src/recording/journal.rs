@@ -132,6 +132,8 @@ pub struct JournalPart {
     pub soaked: bool,
     pub saved: BTreeSet<usize>,
     pub completed: bool,
+    /// How it ended; `None` if nothing wrote that.
+    pub ending: Option<RunEnding>,
     /// Whether its recording cannot be read and contained steps or a soak that no other part has.
     pub unreadable: bool,
     /// Steps that the journal lists and no recording contains.
@@ -149,6 +151,11 @@ impl JournalPart {
     pub(crate) fn is_empty(&self) -> bool {
         !self.soaked && self.saved.is_empty() && !self.unreadable
     }
+}
+
+/// Whether a process runs the run of this journal now: it holds the lock.
+pub fn is_run_now(path: &Path) -> bool {
+    File::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
 
 /// Reads the parts of a run. Unreadable lines are skipped: a step not known to be saved is run again.
@@ -170,6 +177,7 @@ pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
                     soaked: false,
                     saved: BTreeSet::new(),
                     completed: false,
+                    ending: None,
                     unreadable: false,
                     lost: BTreeSet::new(),
                     lost_soak: false,
@@ -179,7 +187,10 @@ pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
             (Ok(Entry::StepSaved(index)), Some(part)) => {
                 part.saved.insert(index);
             }
-            (Ok(Entry::Ended(how)), Some(part)) => part.completed = how == RunEnding::Completed,
+            (Ok(Entry::Ended(how)), Some(part)) => {
+                part.completed = how == RunEnding::Completed;
+                part.ending = Some(how);
+            }
             _ => {}
         }
     }

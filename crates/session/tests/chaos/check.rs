@@ -139,7 +139,9 @@ pub fn life(scenario: &Scenario, life: &Life, lived: &Lived, live: &Path) -> Res
 
 fn safe(scenario: &Scenario, life: &Life, lived: &Lived, live: &Path) -> Result<(), String> {
     let Lived { told, ledger, .. } = lived;
-    if ledger.air_on && !told.locks_out() {
+    // A safe command that is acknowledged without effect is not noticed: the safe state was commanded.
+    let is_deaf = life.faults.iter().any(|(_, fault)| *fault == Fault::NotMadeSafe);
+    if ledger.air_on && !told.locks_out() && !is_deaf {
         return Err("the air is on, and the run does not say so".to_owned());
     }
     let status = RigStates::new(&live.join("states")).status(RIG).map_err(|error| error.to_string())?;
@@ -160,14 +162,18 @@ fn safe(scenario: &Scenario, life: &Life, lived: &Lived, live: &Path) -> Result<
     {
         return Err(format!("a fault at {begin_s} s that latches has left no lockout"));
     }
-    let ending = life.faults.iter().filter(|(_, fault)| must_end(fault));
+    // A batch of one sample has no order.
+    let ending = life
+        .faults
+        .iter()
+        .filter(|(_, fault)| must_end(fault) && !(life.is_real_time && *fault == Fault::Reordered));
     let begin_s = ending.map(|(begin_s, _)| *begin_s).fold(f64::INFINITY, f64::min);
     if told.is_complete() && begin_s + 6.0 < ledger.now_s {
         return Err(format!("a fault at {begin_s} s did not end the run"));
     }
     // Age, a poll, and the run-down of the lab.
     let latest_s = begin_s + 4.0 + 1.5 + 20.0 + 2.0;
-    if !told.locks_out() && ledger.was_on && ledger.cut_s > latest_s {
+    if !told.locks_out() && ledger.was_on && ledger.cut_s > latest_s && !is_deaf {
         return Err(format!("a fault at {begin_s} s, the air off at {} s", ledger.cut_s));
     }
     Ok(())
@@ -226,7 +232,9 @@ fn recorded(life: &Life, lived: &Lived, part: &Part) -> Result<(), String> {
             let speed = report.recording.series.get(&COMPARED[0]);
             let times = speed.map(|speed| speed.t_s.as_slice()).unwrap_or_default();
             let within = times.iter().filter(|t_s| (step.start_s..=step.end_s).contains(*t_s)).count();
-            step.end_s > step.start_s && within as f64 >= (step.end_s - step.start_s) * 10.0 - 1.0
+            let received = ledger.received.iter().map(|(t_s, _)| *t_s);
+            let due = received.filter(|t_s| (step.start_s..=step.end_s).contains(t_s)).count();
+            step.end_s > step.start_s && within + 1 >= due
         });
         if !ended.contains(index) || !is_whole && !is_garbled(life) {
             return Err(format!("the journal lists step {} as saved: {step:?}", index + 1));

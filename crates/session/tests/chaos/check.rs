@@ -232,7 +232,8 @@ fn recorded(life: &Life, lived: &Lived, part: &Part) -> Result<(), String> {
             let speed = report.recording.series.get(&COMPARED[0]);
             let times = speed.map(|speed| speed.t_s.as_slice()).unwrap_or_default();
             let within = times.iter().filter(|t_s| (step.start_s..=step.end_s).contains(*t_s)).count();
-            let received = ledger.received.iter().map(|(t_s, _)| *t_s);
+            let received = ledger.received.iter().filter(|(_, values)| values[0].is_finite());
+            let received = received.map(|(t_s, _)| *t_s);
             let due = received.filter(|t_s| (step.start_s..=step.end_s).contains(t_s)).count();
             step.end_s > step.start_s && within + 1 >= due
         });

@@ -36,4 +36,4 @@ pub use mcap::{ChunkError, recording_program};
 pub use recording_reader::{ReadReport, read_marks, read_recording, read_recording_from};
 pub use scan::ReadOptions;
 pub use topics::{RecordingHeader, StepPhase};
-pub use writer::RecordingWriter;
+pub use writer::{DiskFaults, RecordingWriter, RunFile};

@@ -1,5 +1,6 @@
 //! Topics of a recording and their messages.
 
+use crate::writer::RunFile;
 use mapper_core::{
     Channel, ChannelInfo, Event, Quality, ReadingOrigin, SampleBatch, StepMarker, step_number,
 };
@@ -10,7 +11,6 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io;
 use std::io::BufWriter;
 
@@ -193,7 +193,7 @@ fn object(title: &str, properties: Map<String, Value>) -> Vec<u8> {
 }
 
 /// Chunks are built in memory, without seeking, so that the file ends with a whole chunk at every flush.
-pub(crate) type McapFile = Writer<NoSeek<BufWriter<File>>>;
+pub(crate) type McapFile = Writer<NoSeek<BufWriter<RunFile>>>;
 
 pub(crate) struct OpenedFile {
     pub(crate) mcap: McapFile,
@@ -219,7 +219,7 @@ pub struct RecordingHeader {
 }
 
 /// Starts the file: header, metadata, attachments, and the two topics that every recording has.
-pub(crate) fn open(file: File, header: &RecordingHeader) -> McapResult<OpenedFile> {
+pub(crate) fn open(file: RunFile, header: &RecordingHeader) -> McapResult<OpenedFile> {
     let mut mcap = WriteOptions::new()
         .profile(&header.profile)
         .library(&header.library)

@@ -13,6 +13,45 @@ use serde_json::{Value, json};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Faults of a disk: called before each write with the file and its number of bytes, 0 for a synchronisation; returns how many of them the
+/// disk takes, or its error. For tests.
+pub type DiskFaults = Arc<dyn Fn(&Path, usize) -> io::Result<usize> + Send + Sync>;
+
+/// A file of a run that grows: its recording or its journal.
+pub struct RunFile {
+    file: File,
+    path: PathBuf,
+    faults: Option<DiskFaults>,
+}
+
+impl RunFile {
+    /// A file that is open for writing.
+    pub fn new(file: File, path: &Path, faults: Option<DiskFaults>) -> Self {
+        RunFile { file, path: path.to_owned(), faults }
+    }
+
+    /// Hands everything written to the disk.
+    ///
+    /// # Errors
+    /// The error of the system.
+    pub fn sync_data(&self) -> io::Result<()> {
+        self.faults.as_ref().map_or(Ok(0), |faults| faults(&self.path, 0))?;
+        self.file.sync_data()
+    }
+}
+
+impl io::Write for RunFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let taken = self.faults.as_ref().map_or(Ok(bytes.len()), |faults| faults(&self.path, bytes.len()))?;
+        self.file.write(bytes.get(..taken).unwrap_or(bytes))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
 
 /// A topic of numeric fields in the file. All batches have the same topics: a schema for each batch would cost more than the samples.
 struct TopicLayout {
@@ -59,14 +98,23 @@ pub struct RecordingWriter {
 impl RecordingWriter {
     /// Creates the file and writes header, metadata and attachments.
     pub fn create(path: &Path, header: &RecordingHeader) -> Result<RecordingWriter, RecordError> {
+        RecordingWriter::create_on(None, path, header)
+    }
+
+    /// The same on a disk with faults.
+    pub fn create_on(
+        faults: Option<DiskFaults>,
+        path: &Path,
+        header: &RecordingHeader,
+    ) -> Result<RecordingWriter, RecordError> {
         let file = File::create_new(path).map_err(|source| match source.kind() {
             io::ErrorKind::AlreadyExists => RecordError::Exists { path: path.to_owned() },
             _ => RecordError::Create { path: path.to_owned(), source },
         })?;
-        RecordingWriter::on(file, path, header)
+        RecordingWriter::on(RunFile::new(file, path, faults), path, header)
     }
 
-    fn on(file: File, path: &Path, header: &RecordingHeader) -> Result<RecordingWriter, RecordError> {
+    fn on(file: RunFile, path: &Path, header: &RecordingHeader) -> Result<RecordingWriter, RecordError> {
         let OpenedFile { mcap, step_channel, event_channel } = open(file, header).map_err(|error| {
             RecordError::Write { path: path.to_owned(), saved_until_s: None, source: io_error(error) }
         })?;
@@ -390,9 +438,10 @@ mod tests {
     /// Linux has a device that is always full.
     #[test]
     fn a_full_disk_is_reported_with_the_file_and_a_remedy() {
+        let path = Path::new("run.mcap");
         let full = File::options().write(true).open("/dev/full").unwrap();
-        let error =
-            RecordingWriter::on(full, Path::new("run.mcap"), &RecordingHeader::default()).unwrap_err();
+        let error = RecordingWriter::on(RunFile::new(full, path, None), path, &RecordingHeader::default())
+            .unwrap_err();
         let RecordError::Write { saved_until_s: None, source, .. } = &error else { panic!("{error}") };
         assert_eq!(source.kind(), io::ErrorKind::StorageFull);
         assert!(error.to_string().contains("run.mcap") && error.to_string().contains("make room"), "{error}");

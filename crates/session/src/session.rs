@@ -11,8 +11,8 @@ use mapper_core::{
 use mapper_physics::rig::backend_plugin::{BackendPlugin, NominalRig, ReadEffect};
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
-use mapper_recording::ChannelMap;
 use mapper_recording::logs::LogFormats;
+use mapper_recording::{ChannelMap, DiskFaults};
 use mapper_runner::Operator;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -142,6 +142,8 @@ pub struct Registry {
     pub sentences: Option<Sentences>,
     /// Commit that the program was built from; empty if unknown.
     pub commit: &'static str,
+    /// Faults of the disk of runs, for tests. A run waits for each of its writes then, so that equal faults give equal runs.
+    pub disk: Option<DiskFaults>,
 }
 
 impl Registry {
@@ -156,6 +158,7 @@ impl Registry {
             logs: LogFormats::default(),
             sentences: None,
             commit: "",
+            disk: None,
         }
     }
 

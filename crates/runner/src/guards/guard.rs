@@ -1,6 +1,8 @@
 //! Guards end a step or a run before damage occurs: each is an object outside the runner. Also the check of the speed at the end of a step.
 
-use mapper_core::{Channel, GuardName, OperatingPoint, PlanStep, SampleBatch, SpeedBand, StepKind, Trip};
+use mapper_core::{
+    Channel, GuardName, OperatingPoint, PlanStep, Reaction, SampleBatch, SpeedBand, StepKind, Trip,
+};
 use std::collections::VecDeque;
 
 /// The commanded state of the rig, as far as guards need it.
@@ -16,6 +18,36 @@ pub struct CommandedState {
     pub valve: Option<(f64, f64)>,
     /// Time of the last jump of P3 or the valve, s.
     pub jumped_s: Option<f64>,
+}
+
+/// What a run does after a guard has tripped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum TripResponse {
+    /// It goes on.
+    Continue,
+    /// It holds its setpoints.
+    Hold,
+    /// It ends the step.
+    EndStep,
+    /// It ends in the safe state.
+    End,
+}
+
+impl TripResponse {
+    /// Outside a step nothing can be cut short, and a hold that has lasted too long is none: the run ends.
+    pub fn of(reaction: Reaction, in_step: bool, may_hold: bool) -> Self {
+        match reaction {
+            Reaction::Note => TripResponse::Continue,
+            Reaction::Hold if may_hold => TripResponse::Hold,
+            Reaction::SmallerSteps | Reaction::SkipStep if in_step => TripResponse::EndStep,
+            _ => TripResponse::End,
+        }
+    }
+}
+
+/// Whether a requested stop ends the run now: one that waits for the end of the step does so outside steps.
+pub fn stop_is_due(now: bool, after_step: bool, in_step: bool) -> bool {
+    now || (after_step && !in_step)
 }
 
 /// Checks every sample and may trip.

@@ -60,6 +60,8 @@ run_observer! {
     on_batch(SampleBatch);
     /// A message of the runner: a guard that tripped, a stop, the safe state.
     on_event(Event);
+    /// The rig must be inspected before the next run, whatever follows: why. Comes before anything else is told about it.
+    on_lockout(Event);
     /// A guard has cut the step short: it does not count.
     on_step_abandoned(StepMarker);
     /// A step has ended; `end_s` of its marker is its real end.

@@ -1,8 +1,9 @@
 //! The run itself: soak, warm-up, steps, cool-down.
 
-use crate::guards::guard::{ActiveGuards, CommandedState, Guard, SpeedHistory};
+use crate::guards::guard::{ActiveGuards, CommandedState, Guard, SpeedHistory, TripResponse};
 use crate::guards::plausibility_watch::PlausibilityWatch;
 use crate::run_control::observer::{ObserverError, Operator, Protection, RunError, RunObserver};
+use crate::run_control::safe_shutdown::stated_end;
 use crate::run_control::speed_control::SpeedControl;
 use crate::run_control::transition_control::{Arrival, PressureMotion, TransitionControl};
 use crate::step_source::StepSource;
@@ -51,8 +52,7 @@ pub struct Runner<'a> {
 /// Why the run stopped before its last step.
 pub(crate) enum Halt {
     Interrupted,
-    /// The trip, with the samples that no observer has received yet: the rig is made safe first.
-    Tripped(Trip, Option<Box<SampleBatch>>),
+    Tripped(Trip),
     /// A guard ends this step only.
     Cut(Trip),
     Failed(RunError),
@@ -89,6 +89,8 @@ pub(crate) struct Run<'a, 'p> {
     pub(crate) at: Option<OperatingPoint>,
     /// The step that a guard has cut short, until its end is reported.
     pub(crate) open_step: Option<StepMarker>,
+    /// Samples of the second in which the run ended, which no observer has received yet: the rig is made safe first.
+    pub(crate) unreported: Option<SampleBatch>,
     /// Whether the operator was informed that the run ends with this step.
     pub(crate) stop_confirmed: bool,
 }
@@ -123,6 +125,7 @@ impl Runner<'_> {
             opens_at_once: false,
             at: None,
             open_step: None,
+            unreported: None,
             stop_confirmed: false,
         };
         // After a panic, the possibly inconsistent state is used only to make the rig safe.
@@ -135,11 +138,11 @@ impl Runner<'_> {
         };
         let disarmed = catch_unwind(AssertUnwindSafe(|| run.runner.backend.disarm()));
         let end = end?;
-        match disarmed {
-            Ok(disarmed) => disarmed?,
-            Err(panic) => return Err(RunError::Panicked { message: panic_message(&*panic) }),
-        }
-        Ok(end)
+        let disarmed = match disarmed {
+            Ok(disarmed) => disarmed.map_err(RunError::from),
+            Err(panic) => Err(RunError::Panicked { message: panic_message(&*panic) }),
+        };
+        stated_end(Ok(end), Ok(()), String::new(), disarmed)
     }
 }
 
@@ -236,7 +239,7 @@ impl Run<'_, '_> {
             marker.end_s = self.now_s;
             let trip = match result {
                 Err(Halt::Cut(trip)) => trip,
-                Err(halt @ Halt::Tripped(..)) => {
+                Err(halt @ Halt::Tripped(_)) => {
                     // The rig comes first: the safe shutdown reports the end of the step after its samples.
                     self.open_step = Some(marker);
                     return Err(halt);
@@ -275,7 +278,7 @@ impl Run<'_, '_> {
                 if self.skipped > MAX_SKIPPED_STEPS {
                     let reason =
                         format!("{} consecutive steps were skipped; the last: {}", self.skipped, trip.reason);
-                    return Err(Halt::Tripped(Trip { reaction: Reaction::Safe, reason, ..trip }, None));
+                    return Err(Halt::Tripped(Trip { reaction: Reaction::Safe, reason, ..trip }));
                 }
                 self.runner.steps.after_skipped_step(&marker)?;
                 return Ok(());
@@ -294,7 +297,7 @@ impl Run<'_, '_> {
             step.to.in_words()
         );
         let (guard, reaction) = (GuardName::AvoidedSpeed, Reaction::Safe);
-        Err(Halt::Tripped(Trip { t_s: self.now_s, guard, reaction, reason }, None))
+        Err(Halt::Tripped(Trip { t_s: self.now_s, guard, reaction, reason }))
     }
 
     /// Returns to `before`, then approaches `to` in stages.
@@ -320,10 +323,10 @@ impl Run<'_, '_> {
     fn check_speed(&mut self, step: &PlanStep) -> Result<(), Halt> {
         let missed = self.protection.speed.and_then(|band| self.speed_history.check(band, step, self.now_s));
         let Some(trip) = missed else { return Ok(()) };
-        match trip.reaction {
-            Reaction::Note | Reaction::Hold => self.report_trip(&trip, "the run continues"),
-            Reaction::SmallerSteps | Reaction::SkipStep => Err(Halt::Cut(trip)),
-            Reaction::Safe | Reaction::Latch => Err(Halt::Tripped(trip, None)),
+        match TripResponse::of(trip.reaction, true, true) {
+            TripResponse::Continue | TripResponse::Hold => self.report_trip(&trip, "the run continues"),
+            TripResponse::EndStep => Err(Halt::Cut(trip)),
+            TripResponse::End => Err(Halt::Tripped(trip)),
         }
     }
 
@@ -448,19 +451,19 @@ impl Run<'_, '_> {
             let (batch, trips) = self.poll_until_trip(next_s.min(until_s), in_step)?;
             self.p3_motion.add(&batch);
             if let Some(trip) = trips.iter().find(|trip| trip.reaction.ends_the_run()) {
-                return Err(Halt::Tripped(trip.clone(), Some(Box::new(batch))));
+                let trip = trip.clone();
+                self.unreported = Some(batch);
+                return Err(Halt::Tripped(trip));
             }
             self.runner.observer.on_batch(&batch)?;
             for trip in &trips {
-                match trip.reaction {
-                    Reaction::Note => self.report_trip(trip, "the run continues")?,
-                    Reaction::Hold if held_s < MAX_HOLD_S => {
-                        self.report_trip(trip, "the setpoints are held")?
+                match TripResponse::of(trip.reaction, in_step, held_s < MAX_HOLD_S) {
+                    TripResponse::Continue => self.report_trip(trip, "the run continues")?,
+                    TripResponse::Hold => self.report_trip(trip, "the setpoints are held")?,
+                    TripResponse::EndStep => return Err(Halt::Cut(trip.clone())),
+                    TripResponse::End => {
+                        return Err(Halt::Tripped(Trip { reaction: Reaction::Safe, ..trip.clone() }));
                     }
-                    Reaction::SmallerSteps | Reaction::SkipStep if in_step => {
-                        return Err(Halt::Cut(trip.clone()));
-                    }
-                    _ => return Err(Halt::Tripped(Trip { reaction: Reaction::Safe, ..trip.clone() }, None)),
                 }
             }
             self.pass_requests()?;
@@ -489,7 +492,7 @@ impl Run<'_, '_> {
                         "a guard has held the setpoints for {MAX_HOLD_S:.0} s, and is still violated"
                     );
                     let (guard, reaction) = (GuardName::Signals, Reaction::Safe);
-                    return Err(Halt::Tripped(Trip { t_s: self.now_s, guard, reaction, reason }, None));
+                    return Err(Halt::Tripped(Trip { t_s: self.now_s, guard, reaction, reason }));
                 }
                 continue;
             }
@@ -529,7 +532,13 @@ impl Run<'_, '_> {
             if !self.wait_until_or_stop(next_s, in_step) {
                 return Ok((merged.unwrap_or_default(), Vec::new()));
             }
-            let mut batch = self.runner.backend.poll(next_s)?;
+            let mut batch = match self.runner.backend.poll(next_s) {
+                Ok(batch) => batch,
+                Err(error) => {
+                    self.unreported = merged;
+                    return Err(error);
+                }
+            };
             self.now_s = next_s;
             // Guards check the readings before impossible ones are marked, because a mark must not hide a value above its limit.
             let mut trips = ActiveGuards::new(&mut self.runner.guards).check(&batch, next_s, &self.commanded);

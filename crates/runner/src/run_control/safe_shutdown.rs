@@ -1,10 +1,10 @@
 //! The end of a run: stops by the operator, and the safe shutdown after a fault: first the safe state, then the records of the reason.
 
-use crate::guards::guard::CommandedState;
+use crate::guards::guard::{CommandedState, stop_is_due};
 use crate::run_control::observer::{Protection, RunError};
 use crate::run_control::run::{Halt, Run, Runner, panic_message};
 use crate::run_control::transition_control::StandMotion;
-use mapper_core::{BackendError, Event, EventKind, GuardName, RunEnding, SampleBatch, Setpoints};
+use mapper_core::{BackendError, Event, EventKind, GuardName, Reaction, RunEnding, Setpoints};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -16,7 +16,7 @@ const STEP_S: f64 = 0.1;
 /// How long the rig is observed after it was made safe, s: the recording shows that it reached the safe state.
 const OBSERVATION_S: f64 = 5.0;
 /// Number of safe-state commands before the rig counts as lost.
-const MAX_ATTEMPTS: usize = 3;
+pub const MAX_ATTEMPTS: usize = 3;
 /// Time between two of these commands, s of the run's clock: an interrupted link may recover.
 const PAUSE_S: f64 = 0.5;
 
@@ -27,57 +27,78 @@ pub(crate) fn catch_panic(report: impl FnOnce() -> Result<(), RunError>) -> Resu
     catch_unwind(AssertUnwindSafe(report)).unwrap_or_else(panicked)
 }
 
+/// What a run says of its end, from its reason (`end`, `message`), from the answer to the safe command, and from the record of both.
+///
+/// # Errors
+/// [`RunError::NotSafe`] if the rig did not confirm, whatever the reason; otherwise the reason itself if it is an error, and that of the record
+/// unless a guard ended the run: a full disk must not hide a trip, nor its lockout.
+pub fn stated_end(
+    end: Result<RunEnding, RunError>,
+    safe: Result<(), BackendError>,
+    message: String,
+    reported: Result<(), RunError>,
+) -> Result<RunEnding, RunError> {
+    match (end, safe) {
+        (Err(error), Err(source)) => Err(RunError::NotSafe { why: error.to_string(), source }),
+        (Ok(_), Err(source)) => Err(RunError::NotSafe { why: message, source }),
+        (Err(error), Ok(())) => Err(error),
+        (Ok(end), Ok(())) => match reported {
+            Err(error) if !matches!(end, RunEnding::Tripped(_)) || error.leaves_rig_state_unknown() => {
+                Err(error)
+            }
+            _ => Ok(end),
+        },
+    }
+}
+
 impl Run<'_, '_> {
     /// Makes the rig safe, then reports the reason. It cannot be interrupted and takes a bounded time.
     pub(crate) fn shut_down(&mut self, halt: Halt) -> Result<RunEnding, RunError> {
         // The first command is sent before anything is written: a disk may be slow.
-        self.opens_at_once = matches!(&halt, Halt::Tripped(trip, _) if trip.guard == GuardName::Surge);
+        self.opens_at_once = matches!(&halt, Halt::Tripped(trip) if trip.guard == GuardName::Surge);
         let start = self.begin_run_down();
         // A step that missed its speed does not count, whatever its duration.
-        let step_counts = !matches!(&halt, Halt::Tripped(trip, _) if trip.guard == GuardName::Speed);
-        let (end, kind, message, unreported) = match halt {
+        let step_counts = !matches!(&halt, Halt::Tripped(trip) if trip.guard == GuardName::Speed);
+        let locks_out = match &halt {
+            Halt::Tripped(trip) | Halt::Cut(trip) => trip.reaction == Reaction::Latch,
+            Halt::Failed(error) => error.leaves_rig_state_unknown(),
+            Halt::Interrupted => false,
+        };
+        let (end, kind, message) = match halt {
             Halt::Interrupted => (
                 Ok(RunEnding::Interrupted { t_s: self.now_s }),
                 EventKind::Interrupted,
                 "stopped by the operator".to_owned(),
-                None,
             ),
-            Halt::Tripped(trip, unreported) => {
+            Halt::Tripped(trip) | Halt::Cut(trip) => {
                 let reason = trip.reason.clone();
-                (Ok(RunEnding::Tripped(trip)), EventKind::GuardTripped, reason, unreported)
-            }
-            Halt::Cut(trip) => {
-                let reason = trip.reason.clone();
-                (Ok(RunEnding::Tripped(trip)), EventKind::GuardTripped, reason, None)
+                (Ok(RunEnding::Tripped(trip)), EventKind::GuardTripped, reason)
             }
             Halt::Failed(error) => {
                 let message = error.to_string();
-                (Err(error), EventKind::Note, message, None)
+                (Err(error), EventKind::Note, message)
             }
         };
         // The error that ended the run takes precedence over errors while reporting it.
-        let reported = catch_panic(|| self.report_reason(unreported.as_deref(), step_counts, kind, &message));
+        let reported = catch_panic(|| {
+            if locks_out {
+                self.report_lockout(&message)?;
+            }
+            self.report_reason(step_counts, kind, &message)
+        });
         let safe = self.run_down(start).and_then(|()| self.cut_air());
         let reported = reported.and_then(|()| catch_panic(|| self.report_safe(safe.as_ref().err())));
-        match (end, safe) {
-            (Err(error), Err(source)) => Err(RunError::NotSafe { why: error.to_string(), source }),
-            (Ok(_), Err(source)) => Err(RunError::NotSafe { why: message, source }),
-            (Err(error), Ok(())) => Err(error),
-            (Ok(end), Ok(())) => {
-                reported?;
-                Ok(end)
-            }
-        }
+        stated_end(end, safe, message, reported)
     }
 
-    fn report_reason(
-        &mut self,
-        unreported: Option<&SampleBatch>,
-        step_counts: bool,
-        kind: EventKind,
-        message: &str,
-    ) -> Result<(), RunError> {
-        if let Some(batch) = unreported {
+    fn report_lockout(&mut self, message: &str) -> Result<(), RunError> {
+        let (t_s, kind) = (self.now_s, EventKind::Latched);
+        Ok(self.runner.observer.on_lockout(&Event { t_s, kind, message: message.to_owned() })?)
+    }
+
+    fn report_reason(&mut self, step_counts: bool, kind: EventKind, message: &str) -> Result<(), RunError> {
+        let unreported = self.unreported.take();
+        if let Some(batch) = &unreported {
             self.runner.observer.on_batch(batch)?;
         }
         match self.open_step.take() {
@@ -86,8 +107,9 @@ impl Run<'_, '_> {
             None => {}
         }
         // The rig has reported its own trip in the batch.
-        let was_reported =
-            unreported.is_some_and(|batch| batch.events.iter().any(|event| event.message == message));
+        let was_reported = unreported
+            .as_ref()
+            .is_some_and(|batch| batch.events.iter().any(|event| event.message == message));
         let message = if was_reported { "the run ends, because the rig tripped" } else { message };
         self.runner.observer.on_event(&Event { t_s: self.now_s, kind, message: message.to_owned() })?;
         Ok(self.pass_notes()?)
@@ -97,6 +119,7 @@ impl Run<'_, '_> {
         let t_s = self.now_s;
         if let Some(error) = failed {
             let message = format!("the rig did not confirm its safe state: {error}");
+            self.report_lockout(&message)?;
             return Ok(self.runner.observer.on_event(&Event { t_s, kind: EventKind::Latched, message })?);
         }
         let message = "air off, valve open".to_owned();
@@ -233,7 +256,7 @@ impl Run<'_, '_> {
     /// Whether a stop was requested that ends the run now: outside a step, also one at the end of the step.
     fn is_stop_requested(&self, in_step: bool) -> bool {
         let with_step = self.protection.stop_after_step.load(Ordering::Relaxed);
-        self.runner.stop.load(Ordering::Relaxed) || (with_step && !in_step)
+        stop_is_due(self.runner.stop.load(Ordering::Relaxed), with_step, in_step)
     }
 
     /// Checks for a requested stop. Outside a step the run ends immediately. Within a step, one event confirms the request and states the

@@ -7,6 +7,7 @@ use mapper_core::{
 
 /// A fault, active from its start time on.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(dead_code, reason = "each program of tests uses some of them")]
 pub enum Fault {
     /// A sensor repeats its last reading to the last bit.
     Frozen(Channel),
@@ -47,6 +48,12 @@ pub enum Fault {
     },
     /// The connection is lost permanently.
     Lost,
+    /// The connection is lost for this time, s.
+    LostFor(f64),
+    /// No call is answered.
+    Silent,
+    /// The safe state is acknowledged without effect.
+    NotMadeSafe,
     /// A call panics.
     Panics,
     /// This number of safe-state commands fail.
@@ -102,6 +109,24 @@ impl<B: Backend> FaultyBackend<B> {
 
     fn active_faults(&self) -> Vec<(f64, Fault)> {
         self.faults.iter().filter(|(begin_s, _)| *begin_s <= self.now_s).cloned().collect()
+    }
+
+    /// The error of a call while the connection is lost or silent.
+    fn unreachable(&mut self, call: &'static str) -> Result<(), BackendError> {
+        for (begin_s, fault) in self.active_faults() {
+            match fault {
+                Fault::Lost => return Err(self.lost_error()),
+                Fault::LostFor(duration_s) if self.now_s < begin_s + duration_s => {
+                    let error = self.lost_error();
+                    // The time of the call.
+                    self.now_s += 0.25;
+                    return Err(error);
+                }
+                Fault::Silent => return Err(BackendError::Deadline { call, limit_s: 2.0 }),
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     fn lost_error(&self) -> BackendError {
@@ -218,9 +243,9 @@ impl<B: Backend> Backend for FaultyBackend<B> {
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
         self.commands.push((self.now_s, *setpoints));
+        self.unreachable("set")?;
         for (_, fault) in self.active_faults() {
             match fault {
-                Fault::Lost => return Err(self.lost_error()),
                 Fault::Refuses => {
                     let (quantity, value, unit) = ("P3", setpoints.p3_pa, "Pa");
                     return Err(BackendError::SetpointOutOfRange {
@@ -243,9 +268,9 @@ impl<B: Backend> Backend for FaultyBackend<B> {
 
     #[allow(clippy::panic, reason = "a panic on demand is what it is for")]
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
+        self.unreachable("poll")?;
         for (_, fault) in self.active_faults() {
             match fault {
-                Fault::Lost => return Err(self.lost_error()),
                 Fault::Panics => panic!("a backend that panics on demand"),
                 Fault::Trips { .. } if !self.tripped => self.inner.make_safe()?,
                 _ => {}
@@ -272,9 +297,7 @@ impl<B: Backend> Backend for FaultyBackend<B> {
     }
 
     fn hold(&mut self) -> Result<(), BackendError> {
-        if self.active_faults().iter().any(|(_, fault)| *fault == Fault::Lost) {
-            return Err(self.lost_error());
-        }
+        self.unreachable("hold")?;
         self.held_at_s.push(self.now_s);
         self.inner.hold()
     }
@@ -291,11 +314,12 @@ impl<B: Backend> Backend for FaultyBackend<B> {
                 });
             }
         }
-        if self.active_faults().iter().any(|(_, fault)| *fault == Fault::Lost) {
-            return Err(self.lost_error());
-        }
+        self.unreachable("make_safe")?;
         self.safe_at_s.push(self.now_s);
-        self.inner.make_safe()
+        match self.active_faults().iter().any(|(_, fault)| *fault == Fault::NotMadeSafe) {
+            true => Ok(()),
+            false => self.inner.make_safe(),
+        }
     }
 
     fn disarm(&mut self) -> Result<(), BackendError> {

@@ -3,6 +3,7 @@
 use crate::SessionError;
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, RigDescription, RunEnding, StepMarker};
+use mapper_recording::{DiskFaults, RunFile};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -88,17 +89,16 @@ pub enum Entry {
     Ended(RunEnding),
 }
 
-#[derive(Debug)]
 pub struct Journal {
-    file: File,
+    file: RunFile,
     /// Whether each line is flushed to disk. Needed for rigs that keep running if the computer fails.
     synced: bool,
 }
 
 impl Journal {
     /// Opens and locks the journal of a run to append, so that one process resumes it. `WouldBlock`: another runner has it.
-    pub fn open(path: &Path, synced: bool) -> std::io::Result<Self> {
-        let mut file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
+    pub fn open(path: &Path, synced: bool, faults: Option<DiskFaults>) -> std::io::Result<Self> {
+        let file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
@@ -109,7 +109,8 @@ impl Journal {
             Err(TryLockError::Error(error)) => return Err(error),
         }
         let mut text = Vec::new();
-        (&mut file).take(MAX_JOURNAL_BYTES).read_to_end(&mut text)?;
+        (&file).take(MAX_JOURNAL_BYTES).read_to_end(&mut text)?;
+        let mut file = RunFile::new(file, path, faults);
         // Terminates a line that was torn by a crash.
         if text.last().is_some_and(|last| *last != b'\n') {
             file.write_all(b"\n")?;
@@ -223,7 +224,7 @@ mod tests {
     fn a_journal_cut_anywhere_keeps_the_complete_lines() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("journal");
-        let mut journal = Journal::open(&path, false).unwrap();
+        let mut journal = Journal::open(&path, false, None).unwrap();
         let entries = [
             part("a"),
             Entry::Soaked,
@@ -237,7 +238,7 @@ mod tests {
             journal.write(entry).unwrap();
             ends.push(std::fs::metadata(&path).unwrap().len() as usize);
         }
-        assert_eq!(Journal::open(&path, false).unwrap_err().kind(), ErrorKind::WouldBlock);
+        assert_eq!(Journal::open(&path, false, None).map(drop).unwrap_err().kind(), ErrorKind::WouldBlock);
         drop(journal);
         let whole = std::fs::read(&path).unwrap();
         for cut in 0..=whole.len() {
@@ -247,7 +248,7 @@ mod tests {
             let written = ends.iter().filter(|end| **end > 0 && **end <= cut + 1).count();
             let saved: usize = parts.iter().map(|part| part.saved.len() + usize::from(part.soaked) + 1).sum();
             assert_eq!(saved, written, "cut at {cut}");
-            Journal::open(&path, false).unwrap().write(&part("c")).unwrap();
+            Journal::open(&path, false, None).unwrap().write(&part("c")).unwrap();
             let more = read_journal(&path).unwrap();
             assert_eq!(more.last().unwrap().recording, "c");
             assert_eq!(more.len(), parts.len() + 1);
@@ -259,7 +260,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("journal");
         for name in ["/etc/passwd", "../other/recording.mcap", "", "..", "a/../b"] {
-            let mut journal = Journal::open(&path, false).unwrap();
+            let mut journal = Journal::open(&path, false, None).unwrap();
             journal.write(&part(name)).unwrap();
             assert_eq!(read_journal(&path).unwrap_err().kind(), ErrorKind::InvalidData, "{name}");
             std::fs::remove_file(&path).unwrap();
@@ -272,7 +273,7 @@ mod tests {
         use mapper_core::{Event, EventKind};
         for (recorded, soaked) in [(EventKind::SoakStarted, false), (EventKind::SoakEnded, true)] {
             let directory = tempfile::tempdir().unwrap();
-            let mut journal = Journal::open(&directory.path().join("journal.jsonl"), false).unwrap();
+            let mut journal = Journal::open(&directory.path().join("journal.jsonl"), false, None).unwrap();
             journal.write(&part("recording.mcap")).unwrap();
             journal.write(&Entry::Soaked).unwrap();
             let header = mapper_recording::RecordingHeader {

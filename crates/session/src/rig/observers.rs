@@ -2,13 +2,14 @@
 
 use crate::SessionEvent;
 use crate::recording::journal::{Entry, Journal};
+use crate::rig::rig_state::RigLease;
 use crate::session::OnEvent;
 use mapper_core::{Event, EventKind, Method, Recording, RigDescription, RunEnding, SampleBatch, StepMarker};
 use mapper_identify::{IdentifyConfig, identify_each};
-use mapper_recording::{RecordError, RecordingWriter, StepPhase};
+use mapper_recording::{RecordError, RecordingWriter, RunFile, StepPhase};
 use mapper_runner::{ObserverError, RunObserver};
-use std::fs::File;
 use std::panic::resume_unwind;
+use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{Scope, ScopedJoinHandle};
 
@@ -19,7 +20,7 @@ pub(crate) struct Recorder {
     /// Entries whose data may not be flushed yet, with the flushed sample time at that moment, s.
     pending: Vec<(Entry, Option<f64>)>,
     /// A second handle to the recording, to flush it to disk. `None` for simulated rigs, which stop with the computer.
-    sync_handle: Option<File>,
+    sync_handle: Option<RunFile>,
 }
 
 impl Recorder {
@@ -28,7 +29,7 @@ impl Recorder {
     }
 
     /// Keeps a journal, and flushes everything to disk if `sync_handle` is given.
-    pub(crate) fn with_journal(self, journal: Journal, sync_handle: Option<File>) -> Self {
+    pub(crate) fn with_journal(self, journal: Journal, sync_handle: Option<RunFile>) -> Self {
         Recorder { journal: Some(journal), sync_handle, ..self }
     }
 
@@ -102,6 +103,22 @@ impl RunObserver for Recorder {
     }
 }
 
+/// Locks the rig out as soon as it must be inspected, so that a kill during the safe shutdown does not lose it.
+pub(crate) struct Lockouts<'scope, 'env> {
+    pub lease: &'env RigLease,
+    pub run: &'env Path,
+    pub scope: &'scope Scope<'scope, 'env>,
+}
+
+impl RunObserver for Lockouts<'_, '_> {
+    fn on_lockout(&mut self, event: &Event) -> Result<(), ObserverError> {
+        let (lease, run, reason) = (self.lease, self.run, event.message.clone());
+        // On a thread of its own: the disk must not delay the shutdown. The release of the rig tries again and reports an error.
+        self.scope.spawn(move || drop(lease.lock_out(reason, run)));
+        Ok(())
+    }
+}
+
 pub(crate) struct EventForwarder<'a> {
     pub on_event: OnEvent<'a>,
     pub steps: usize,
@@ -166,22 +183,33 @@ struct ObserverStopped;
 /// Makes all calls, in order, on another thread until its observer fails. The next call returns the error; all later calls fail.
 pub(crate) struct ThreadedObserver<'scope, O> {
     to_thread: SyncSender<Call<'scope, O>>,
+    /// Receives the end of each call, if the calls are to be waited for.
+    done: Option<Receiver<()>>,
     thread: ScopedJoinHandle<'scope, O>,
     failed: Receiver<ObserverError>,
 }
 
 impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
-    pub(crate) fn start<'env>(scope: &'scope Scope<'scope, 'env>, mut observer: O) -> Self {
+    /// `waits`: each call returns after it was made.
+    pub(crate) fn start<'env>(scope: &'scope Scope<'scope, 'env>, mut observer: O, waits: bool) -> Self {
         let (to_thread, calls) = sync_channel::<Call<'scope, O>>(MAX_WAITING_CALLS);
         let (fail, failed) = channel();
+        let (made, done) = waits.then(channel).unzip();
         let thread = scope.spawn(move || {
             // The error must be stored before the end of the thread becomes visible.
-            if let Err(error) = calls.iter().try_for_each(|call| call(&mut observer)) {
+            let mut make = |call: Call<'scope, O>| {
+                call(&mut observer)?;
+                if let Some(made) = &made {
+                    let _ = made.send(());
+                }
+                Ok(())
+            };
+            if let Err(error) = calls.iter().try_for_each(|call| make(call)) {
                 let _ = fail.send(error);
             }
             observer
         });
-        ThreadedObserver { to_thread, thread, failed }
+        ThreadedObserver { to_thread, done, thread, failed }
     }
 
     /// Waits for the end of all calls. Returns the observer, and its error if no earlier call has returned that.
@@ -195,9 +223,10 @@ impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
         &mut self,
         call: impl FnOnce(&mut O) -> Result<(), ObserverError> + Send + 'scope,
     ) -> Result<(), ObserverError> {
-        match self.to_thread.send(Box::new(call)) {
-            Ok(()) => Ok(()),
-            Err(_) => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::new(ObserverStopped))),
+        let is_sent = self.to_thread.send(Box::new(call)).is_ok();
+        match is_sent && self.done.as_ref().is_none_or(|done| done.recv().is_ok()) {
+            true => Ok(()),
+            false => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::new(ObserverStopped))),
         }
     }
 }
@@ -344,7 +373,7 @@ mod tests {
         let times: Vec<f64> = (0..1000).map(f64::from).collect();
         let (observer, error) = scope(|scope| {
             let mut threaded =
-                ThreadedObserver::start(scope, Counts { times: Vec::new(), fails_at: usize::MAX });
+                ThreadedObserver::start(scope, Counts { times: Vec::new(), fails_at: usize::MAX }, false);
             times.iter().for_each(|t_s| threaded.on_event(&event(*t_s)).unwrap());
             threaded.end()
         });
@@ -357,7 +386,8 @@ mod tests {
     fn an_error_is_reported_and_later_events_are_not_observed() {
         for fails_at in [0, 1, 50, 99] {
             let (observer, errors) = scope(|scope| {
-                let mut threaded = ThreadedObserver::start(scope, Counts { times: Vec::new(), fails_at });
+                let mut threaded =
+                    ThreadedObserver::start(scope, Counts { times: Vec::new(), fails_at }, false);
                 let results: Vec<_> = (0..100).map(|t_s| threaded.on_event(&event(f64::from(t_s)))).collect();
                 let (observer, at_end) = threaded.end();
                 let errors =
@@ -385,7 +415,7 @@ mod tests {
         }
         let ended = std::panic::catch_unwind(|| {
             scope(|scope| {
-                let mut threaded = ThreadedObserver::start(scope, Panics);
+                let mut threaded = ThreadedObserver::start(scope, Panics, false);
                 let refused = (0..1000).any(|t_s| threaded.on_event(&event(f64::from(t_s))).is_err());
                 assert!(refused, "a thousand events after the observer failed");
                 threaded.end().1

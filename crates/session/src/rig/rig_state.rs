@@ -78,6 +78,8 @@ pub struct Claim {
     states: RigStates,
     rig: String,
     lock: File,
+    /// Whether an earlier run, the one that is resumed, has not released it.
+    pub(crate) is_abandoned: bool,
 }
 
 /// Status of a rig.
@@ -152,15 +154,17 @@ impl RigStates {
             SessionError::RigLockedOut { rig: rig.to_owned(), reason, run: PathBuf::new() }
         })?;
         let is_new = owner.is_none();
-        let is_other = |owner: &Owner| resumes.is_none_or(|run| !is_same_directory(run, &owner.run));
-        if let Some(owner) = owner.flatten().filter(is_other) {
+        let is_other = |owner: &&Owner| resumes.is_none_or(|run| !is_same_directory(run, &owner.run));
+        let owner = owner.flatten();
+        if let Some(owner) = owner.as_ref().filter(is_other) {
             return Err(SessionError::RigAbandoned {
                 rig: rig.to_owned(),
                 run: owner.run.clone(),
                 owner: owner.to_string(),
             });
         }
-        let mut claim = Claim { states: self.clone(), rig: rig.to_owned(), lock };
+        let (states, rig) = (self.clone(), rig.to_owned());
+        let mut claim = Claim { states, rig, lock, is_abandoned: owner.is_some() };
         if is_new {
             claim.write(None)?;
         }
@@ -269,7 +273,7 @@ impl RigStates {
             }
             _ => {}
         }
-        Claim { states: self.clone(), rig: rig.to_owned(), lock }.write(None)?;
+        Claim { states: self.clone(), rig: rig.to_owned(), lock, is_abandoned: false }.write(None)?;
         Ok(status)
     }
 }
@@ -298,6 +302,11 @@ impl Claim {
 
     pub fn release(mut self) -> Result<(), SessionError> {
         self.write(None)
+    }
+
+    /// Releases a rig that was not armed. One that an earlier run has not released stays as that run has left it.
+    pub fn release_untouched(self) -> Result<(), SessionError> {
+        if self.is_abandoned { Ok(()) } else { self.release() }
     }
 }
 
@@ -425,20 +434,35 @@ impl RigLease {
         Ok(RigLease { rig, instruments })
     }
 
+    #[cfg(test)]
+    pub(crate) fn of(rig: Claim) -> Self {
+        RigLease { rig: Some(rig), instruments: Vec::new() }
+    }
+
     pub(crate) fn record_owner(&mut self, run: &Path, started: &str) -> Result<(), SessionError> {
         self.rig.as_mut().map_or(Ok(()), |claim| claim.record_owner(&owner(run, started)))
     }
 
+    /// Locks the rig out until an operator acknowledges it.
+    pub(crate) fn lock_out(&self, reason: String, run: &Path) -> Result<(), SessionError> {
+        let claim = self.rig.as_ref();
+        claim.map_or(Ok(()), |claim| claim.lock_out(&Lockout { reason, run: run.to_owned() }))
+    }
+
+    /// Releases all locks of a run that has not armed the rig.
+    pub(crate) fn release_untouched(self) -> Result<(), SessionError> {
+        self.instruments.into_iter().chain(self.rig).try_for_each(Claim::release_untouched)
+    }
+
     /// Releases all locks. With a reason for a lockout, the rig is locked out until an operator acknowledges it.
     pub(crate) fn release(self, lockout: Option<String>, run: &Path) -> Result<(), SessionError> {
-        for instrument in self.instruments {
-            instrument.release()?;
-        }
-        let Some(claim) = self.rig else { return Ok(()) };
         if let Some(reason) = lockout {
-            claim.lock_out(&Lockout { reason, run: run.to_owned() })?;
+            self.lock_out(reason, run)?;
         }
-        claim.release()
+        for claim in self.instruments.into_iter().chain(self.rig) {
+            claim.release()?;
+        }
+        Ok(())
     }
 }
 

@@ -9,7 +9,7 @@ use crate::recording::journal::{Entry, Identity, Journal, rig_sha256};
 use crate::recording::resume::{InterruptedRun, MissingSteps, depends_on_readings};
 use crate::recording::run_directory;
 use crate::rig::drive::{Pace, check_guards, drive_paced, soak_s};
-use crate::rig::observers::{EventForwarder, Recorder, StepEstimator, ThreadedObserver};
+use crate::rig::observers::{EventForwarder, Lockouts, Recorder, StepEstimator, ThreadedObserver};
 use crate::rig::rig_state::{ADDRESS_PREFIX, RigLease, RigStates};
 use crate::rig::sources::Sources;
 use crate::run::commissioning::Commissioning;
@@ -20,10 +20,11 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
 use mapper_core::{Clock, Plan, PlanInputHashes, Reaction, RigDescription, RunEnding, UnpacedClock};
 use mapper_physics::simulation::model::Model;
-use mapper_recording::{ChannelMap, RecordingHeader, RecordingWriter};
+use mapper_recording::{ChannelMap, DiskFaults, RecordingHeader, RecordingWriter, RunFile};
 use mapper_report::Message;
 use mapper_runner::{
     DeadlineBackend, Deadlines, DriftWatch, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch,
+    stated_end,
 };
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -112,7 +113,7 @@ fn for_files(end: &Result<RunEnding, RunError>) -> RunEnding {
 }
 
 /// Why the rig must be locked out: its state is unknown, or it must be inspected before the next run. `None` if the next run may start.
-fn lockout_reason(end: &Result<RunEnding, RunError>) -> Option<String> {
+pub(crate) fn lockout_reason(end: &Result<RunEnding, RunError>) -> Option<String> {
     match end {
         Ok(RunEnding::Tripped(trip)) if trip.reaction == Reaction::Latch => Some(trip.reason.clone()),
         Err(error) if error.leaves_rig_state_unknown() => Some(error.to_string()),
@@ -222,7 +223,6 @@ impl PreparedRun<'_> {
         clock: &mut dyn Clock,
         each_sample: bool,
     ) -> Result<(Self, RecordedRun), SessionError> {
-        let campaign = self.request.campaign;
         let rig = self.rig();
         if !rig.simulated_time {
             let backend =
@@ -230,32 +230,15 @@ impl PreparedRun<'_> {
             self.sources.backend = Box::new(backend);
         }
         let mut lease = self.acquire_lease(&rig)?;
-        let (directory, plan_json) = (self.create_directory()?, json_text(&self.plan)?);
-        lease.record_owner(&directory, self.request.started_name)?;
-        check_room(&directory, soak_s(campaign) + self.plan.duration_s(), &rig)?;
-        let mut parts = self.earlier_parts(&directory);
-        let name = match parts.len() {
-            0 => run_directory::RECORDING.to_owned(),
-            before => run_directory::further_recording(before + 1),
-        };
-        let recording = directory.join(&name);
-        let path = directory.join(run_directory::JOURNAL);
-        let mut journal = Journal::open(&path, !rig.simulated_time).map_err(|error| match error.kind() {
-            ErrorKind::WouldBlock => {
-                SessionError::NotResumable { run: directory.clone(), why: error.to_string() }
+        let opened = self.open_recorder(&mut lease, &rig, &session.registry.disk);
+        let (directory, recording, recorder) = match opened {
+            Ok(opened) => opened,
+            Err(error) => {
+                lease.release_untouched()?;
+                return Err(error);
             }
-            _ => SessionError::file("write", &path)(error),
-        })?;
-        // With several sources, each has its own sample times.
-        let writer = RecordingWriter::create(&recording, &self.header(plan_json))?
-            .omit_absent(!self.sources.auxiliary_channels.is_empty());
-        let identity = Identity::of(campaign, &self.plan, &rig)?;
-        journal
-            .write(&Entry::Part { identity, recording: name })
-            .map_err(SessionError::file("write", &path))?;
-        // A rig in real time keeps running if this computer fails, so the recording is flushed to disk.
-        let sync_handle = if rig.simulated_time { None } else { std::fs::File::open(&recording).ok() };
-        let recorder = Recorder::new(writer).with_journal(journal, sync_handle);
+        };
+        let mut parts = self.earlier_parts(&directory);
         let auxiliary_channels = self.sources.auxiliary_channels.clone();
         let pace = Pace {
             clock,
@@ -265,8 +248,11 @@ impl PreparedRun<'_> {
             operator: session.operator,
             auxiliary_channels: &auxiliary_channels,
         };
-        let (end, finished, lockout) = self.drive_and_record(session, recorder, pace);
-        lease.release(lockout, &directory)?;
+        let (end, finished, lockout) = self.drive_and_record(session, recorder, &directory, &lease, pace);
+        match (&end, lockout) {
+            (Err(RunError::NotArmed(_)), None) => lease.release_untouched()?,
+            (_, lockout) => lease.release(lockout, &directory)?,
+        }
         session.send(SessionEvent::RigReleased);
         if let Err(error @ RunError::NotArmed(_)) = end {
             return Err(self.discard_unarmed_run(error, &directory));
@@ -277,6 +263,47 @@ impl PreparedRun<'_> {
         }
         parts.push(RunPart { recording: recording.clone(), soaked: true, saved: None });
         Ok((self, RecordedRun { directory, recording, end, parts }))
+    }
+
+    /// Creates the files of a run, before the rig is armed: its directory, recording and journal.
+    fn open_recorder(
+        &self,
+        lease: &mut RigLease,
+        rig: &RigDescription,
+        disk: &Option<DiskFaults>,
+    ) -> Result<(PathBuf, PathBuf, Recorder), SessionError> {
+        let (directory, plan_json) = (self.create_directory()?, json_text(&self.plan)?);
+        lease.record_owner(&directory, self.request.started_name)?;
+        check_room(&directory, soak_s(self.request.campaign) + self.plan.duration_s(), rig)?;
+        let mut name = run_directory::RECORDING.to_owned();
+        if let Some(interrupted) = &self.request.resume {
+            // A kill before the journal named its recording leaves one that is no part; one that is gone keeps its name.
+            let is_used = |name: &String| {
+                directory.join(name).exists() || interrupted.parts.iter().any(|part| part.recording == *name)
+            };
+            let mut names = (2..).map(run_directory::further_recording);
+            name = names.find(|name| !is_used(name)).unwrap_or(name);
+        }
+        let recording = directory.join(&name);
+        let path = directory.join(run_directory::JOURNAL);
+        let mut journal =
+            Journal::open(&path, !rig.simulated_time, disk.clone()).map_err(|error| match error.kind() {
+                ErrorKind::WouldBlock => {
+                    SessionError::NotResumable { run: directory.clone(), why: error.to_string() }
+                }
+                _ => SessionError::file("write", &path)(error),
+            })?;
+        // With several sources, each has its own sample times.
+        let writer = RecordingWriter::create_on(disk.clone(), &recording, &self.header(plan_json))?
+            .omit_absent(!self.sources.auxiliary_channels.is_empty());
+        let identity = Identity::of(self.request.campaign, &self.plan, rig)?;
+        journal
+            .write(&Entry::Part { identity, recording: name })
+            .map_err(SessionError::file("write", &path))?;
+        // A rig in real time keeps running if this computer fails, so the recording is flushed to disk.
+        let opened = if rig.simulated_time { None } else { std::fs::File::open(&recording).ok() };
+        let sync_handle = opened.map(|file| RunFile::new(file, &recording, disk.clone()));
+        Ok((directory, recording, Recorder::new(writer).with_journal(journal, sync_handle)))
     }
 
     fn discard_unarmed_run(&self, error: RunError, directory: &Path) -> SessionError {
@@ -366,6 +393,8 @@ impl PreparedRun<'_> {
         &mut self,
         session: &Session<'_>,
         recorder: Recorder,
+        directory: &Path,
+        lease: &RigLease,
         pace: Pace<'_>,
     ) -> (Result<RunEnding, RunError>, Result<(), SessionError>, Option<String>) {
         let mut planned = PlanSteps::new(&self.plan);
@@ -413,8 +442,9 @@ impl PreparedRun<'_> {
         let (end, drifted, recorder) = std::thread::scope(|scope| {
             let start = || StepEstimator::start(scope, identification(campaign), session.on_event);
             let mut estimates = session.estimates.then(start);
-            let mut recorder = ThreadedObserver::start(scope, recorder);
-            let mut observers: Vec<&mut dyn RunObserver> = vec![&mut recorder, &mut forwarder];
+            let mut recorder = ThreadedObserver::start(scope, recorder, session.registry.disk.is_some());
+            let mut lockouts = Lockouts { lease, run: directory, scope };
+            let mut observers: Vec<&mut dyn RunObserver> = vec![&mut lockouts, &mut recorder, &mut forwarder];
             observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
             let run_steps = |steps: &mut dyn StepSource| {
                 drive_resumed(replayed, steps, |steps| {
@@ -430,8 +460,9 @@ impl PreparedRun<'_> {
                 None => (run_steps(steps), None),
             };
             let (recorder, recorded) = recorder.end();
-            // A write error at the very end is reported after the run.
-            let end = end.and_then(|end| recorded.map(|()| end).map_err(RunError::from));
+            // A write error at the very end is reported after the run, unless a guard ended it.
+            let recorded = recorded.map_err(RunError::from);
+            let end = end.and_then(|end| stated_end(Ok(end), Ok(()), String::new(), recorded));
             (end, drifted, recorder)
         });
         let lockout = lockout_reason(&end);

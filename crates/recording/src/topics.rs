@@ -1,6 +1,6 @@
 //! Topics of a recording and their messages.
 
-use crate::writer::RunFile;
+use crate::run_file::RunFile;
 use mapper_core::{
     Channel, ChannelInfo, Event, Quality, ReadingOrigin, SampleBatch, StepMarker, step_number,
 };

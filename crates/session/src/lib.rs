@@ -59,7 +59,7 @@ pub use run::run_stop::{Phase, RunStop, SignalResponse};
 pub use session::{Registry, Session, SessionEvent};
 
 #[cfg(test)]
-#[path = "../tests/safety_model.rs"]
+#[path = "../tests/common/safety_model.rs"]
 mod safety_model;
 #[cfg(test)]
 #[path = "../tests/common/shipped.rs"]

@@ -4,7 +4,8 @@ use crate::guards::plausibility_watch::ReadingBounds;
 use crate::run_control::transition_control::StandMotion;
 use crate::step_source::StepSourceError;
 use mapper_core::{
-    BackendError, Event, RigDescription, SafeTrajectory, SampleBatch, SetpointRanges, SpeedBand, StepMarker,
+    BackendError, Event, RigDescription, RunEnding, SafeTrajectory, SampleBatch, SetpointRanges, SpeedBand,
+    StepMarker,
 };
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -186,5 +187,29 @@ impl Default for Protection<'_> {
             each_sample: false,
             operator: None,
         }
+    }
+}
+
+/// What a run says of its end, from its reason (`end`, `message`), from the answer to the safe command, and from the record of both.
+///
+/// # Errors
+/// [`RunError::NotSafe`] if the rig did not confirm, whatever the reason; otherwise the reason itself if it is an error, and that of the record
+/// unless a guard ended the run: a full disk must not hide a trip, nor its lockout.
+pub fn stated_end(
+    end: Result<RunEnding, RunError>,
+    safe: Result<(), BackendError>,
+    message: String,
+    reported: Result<(), RunError>,
+) -> Result<RunEnding, RunError> {
+    match (end, safe) {
+        (Err(error), Err(source)) => Err(RunError::NotSafe { why: error.to_string(), source }),
+        (Ok(_), Err(source)) => Err(RunError::NotSafe { why: message, source }),
+        (Err(error), Ok(())) => Err(error),
+        (Ok(end), Ok(())) => match reported {
+            Err(error) if !matches!(end, RunEnding::Tripped(_)) || error.leaves_rig_state_unknown() => {
+                Err(error)
+            }
+            _ => Ok(end),
+        },
     }
 }

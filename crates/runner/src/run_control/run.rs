@@ -2,8 +2,7 @@
 
 use crate::guards::guard::{ActiveGuards, CommandedState, Guard, SpeedHistory, TripResponse};
 use crate::guards::plausibility_watch::PlausibilityWatch;
-use crate::run_control::observer::{ObserverError, Operator, Protection, RunError, RunObserver};
-use crate::run_control::safe_shutdown::stated_end;
+use crate::run_control::observer::{ObserverError, Operator, Protection, RunError, RunObserver, stated_end};
 use crate::run_control::speed_control::SpeedControl;
 use crate::run_control::transition_control::{Arrival, PressureMotion, TransitionControl};
 use crate::step_source::StepSource;

@@ -1,7 +1,7 @@
 //! The end of a run: stops by the operator, and the safe shutdown after a fault: first the safe state, then the records of the reason.
 
 use crate::guards::guard::{CommandedState, stop_is_due};
-use crate::run_control::observer::{Protection, RunError};
+use crate::run_control::observer::{Protection, RunError, stated_end};
 use crate::run_control::run::{Halt, Run, Runner, panic_message};
 use crate::run_control::transition_control::StandMotion;
 use mapper_core::{BackendError, Event, EventKind, GuardName, Reaction, RunEnding, Setpoints};
@@ -25,30 +25,6 @@ pub(crate) fn catch_panic(report: impl FnOnce() -> Result<(), RunError>) -> Resu
     let panicked =
         |panic: Box<dyn std::any::Any + Send>| Err(RunError::Panicked { message: panic_message(&*panic) });
     catch_unwind(AssertUnwindSafe(report)).unwrap_or_else(panicked)
-}
-
-/// What a run says of its end, from its reason (`end`, `message`), from the answer to the safe command, and from the record of both.
-///
-/// # Errors
-/// [`RunError::NotSafe`] if the rig did not confirm, whatever the reason; otherwise the reason itself if it is an error, and that of the record
-/// unless a guard ended the run: a full disk must not hide a trip, nor its lockout.
-pub fn stated_end(
-    end: Result<RunEnding, RunError>,
-    safe: Result<(), BackendError>,
-    message: String,
-    reported: Result<(), RunError>,
-) -> Result<RunEnding, RunError> {
-    match (end, safe) {
-        (Err(error), Err(source)) => Err(RunError::NotSafe { why: error.to_string(), source }),
-        (Ok(_), Err(source)) => Err(RunError::NotSafe { why: message, source }),
-        (Err(error), Ok(())) => Err(error),
-        (Ok(end), Ok(())) => match reported {
-            Err(error) if !matches!(end, RunEnding::Tripped(_)) || error.leaves_rig_state_unknown() => {
-                Err(error)
-            }
-            _ => Ok(end),
-        },
-    }
 }
 
 impl Run<'_, '_> {

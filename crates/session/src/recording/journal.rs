@@ -6,7 +6,7 @@ use mapper_core::{Plan, RigDescription, RunEnding, StepMarker};
 use mapper_recording::{DiskFaults, RunFile};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{OpenOptions, TryLockError};
 use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
 
@@ -156,7 +156,8 @@ impl JournalPart {
 
 /// Whether a process runs the run of this journal now: it holds the lock.
 pub fn is_run_now(path: &Path) -> bool {
-    File::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    mapper_yaml::open_file(path)
+        .is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
 
 /// Reads the parts of a run. Unreadable lines are skipped: a step not known to be saved is run again.

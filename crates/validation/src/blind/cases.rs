@@ -49,7 +49,7 @@ pub enum BlindError {
     Cases { cases: usize, max: usize },
     #[error("no effect is called {id}; those of the library are {known}. Give another cause as a sentence")]
     UnknownCause { id: String, known: String },
-    #[error("{id} takes {low} to {high} {unit}, but {value} was given")]
+    #[error("{id} takes {low} to {high}{unit}, but {value} was given")]
     CauseRange { id: String, value: f64, low: f64, high: f64, unit: String },
     #[error("{id} has the parameters {parameters}; give a value for each")]
     CauseParameters { id: String, parameters: String },

@@ -126,7 +126,7 @@ pub fn plant(
                     value: *value,
                     low: parameter.low,
                     high: parameter.high,
-                    unit: parameter.unit.to_string(),
+                    unit: if parameter.unit == "1" { String::new() } else { format!(" {}", parameter.unit) },
                 });
             }
         }

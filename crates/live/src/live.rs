@@ -259,7 +259,7 @@ mod tests {
         let mut read = Vec::new();
         page.read_to_end(&mut read).unwrap();
         assert!(read.len() > 1 << 22);
-        // What is no head of a request, a head that never ends, and one of too many lines press nothing.
+        // A malformed head of a request, a head that never ends, and one of too many lines press no button.
         let many = format!("POST /ask/safe HTTP/1.1\r\n{}\r\n", "a: b\r\n".repeat(100));
         for head in ["\u{1}".repeat(64), "a".repeat(100_000), many] {
             let mut refused = Vec::new();

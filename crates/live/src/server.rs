@@ -189,7 +189,7 @@ impl Hub {
 
     pub(crate) fn publish(&self, message: Arc<str>) {
         if let Ok(Some(sender)) = self.0.lock().as_deref() {
-            // Without a browser there is no receiver.
+            // Without a browser nothing receives it.
             let _ = sender.send(message);
         }
     }

@@ -120,7 +120,7 @@ async fn sign_in(State(bench): State<Arc<Bench>>, Form(fields): Form<Fields>) ->
 
 /// Why a request has no page.
 enum Refusal {
-    /// There is no such run, or no such file of it.
+    /// The run, or its file, does not exist.
     Unknown(&'static str),
     Session(SessionError),
 }
@@ -151,8 +151,8 @@ impl Bench {
     /// The folder of the run of this number.
     fn folder(&self, id: &str) -> Result<RunFolder, Refusal> {
         let row = id.parse().ok().map(|id| lock(&self.history).catalogued(id)).transpose()?.flatten();
-        let row =
-            row.ok_or(Refusal::Unknown("There is no such run; it may have been moved. Look for new runs."))?;
+        let row = row
+            .ok_or(Refusal::Unknown("This run does not exist; it may have been moved. Look for new runs."))?;
         Ok(RunFolder::of(&self.directory, row)?)
     }
 

@@ -1,6 +1,6 @@
 //! Recordings in memory: series of readings, samples of the rig, steps and events.
 
-use crate::{Channel, Element, OperatingPoint, StepKind, step_number};
+use crate::{Channel, Element, OperatingPoint, PlanStep, StepKind, step_number};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -262,6 +262,22 @@ impl StepMarker {
     /// Number of the step in its run, from 1; `None` for a repeated step outside the plan.
     pub fn number(&self) -> Option<usize> {
         (self.index < StepMarker::FIRST_REPEAT_INDEX).then(|| step_number(self.index))
+    }
+}
+
+/// The step as it would be recorded without delays.
+impl From<&PlanStep> for StepMarker {
+    fn from(step: &PlanStep) -> Self {
+        StepMarker {
+            index: step.index,
+            kind: step.kind,
+            start_s: step.start_s,
+            end_s: step.start_s + step.dwell_s,
+            from: step.from,
+            to: Some(step.to),
+            p3_pa: step.p3_pa,
+            valve_opening_ratio: step.to.valve_opening_ratio,
+        }
     }
 }
 

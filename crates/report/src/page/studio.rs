@@ -89,7 +89,7 @@ impl RunList<'_> {
             }
             @if runs.is_empty() {
                 p #empty {
-                    @if *all == 0 { "There is no run yet. Run a campaign with its output below this directory, or copy a run folder here, then look for new runs." }
+                    @if *all == 0 { "No runs yet. Run a campaign with its output below this directory, or copy a run folder here, then look for new runs." }
                     @else { "No run has all of that. Use fewer words, or show all." }
                 }
             } @else {

@@ -13,8 +13,8 @@ use std::time::Duration;
 
 /// Time between two setpoints of the run-down, s.
 const STEP_S: f64 = 0.1;
-/// How long the rig is observed after it was made safe, s: the recording shows that it reached the safe state.
-const OBSERVATION_S: f64 = 5.0;
+/// How long the rig is observed after it was made safe, s, one at a time, as a kill may cost: the recording shows that it reached the safe state.
+const OBSERVATION_S: u8 = 5;
 /// Number of safe-state commands before the rig counts as lost.
 pub const MAX_ATTEMPTS: usize = 3;
 /// Time between two of these commands, s of the run's clock: an interrupted link may recover.
@@ -100,12 +100,15 @@ impl Run<'_, '_> {
         }
         let message = "air off, valve open".to_owned();
         self.runner.observer.on_event(&Event { t_s, kind: EventKind::SafeState, message })?;
-        self.runner.clock.wait_until(t_s + OBSERVATION_S);
-        // The rig is already safe: a panic of the backend here costs only the last seconds of the recording.
-        match catch_unwind(AssertUnwindSafe(|| self.runner.backend.poll(t_s + OBSERVATION_S))) {
-            Ok(batch) => Ok(self.runner.observer.on_batch(&batch?)?),
-            Err(_) => Ok(()),
+        for second in 1..=OBSERVATION_S {
+            let until_s = t_s + f64::from(second);
+            self.runner.clock.wait_until(until_s);
+            // The rig is already safe: a panic of the backend here costs only the last seconds of the recording.
+            let polled = catch_unwind(AssertUnwindSafe(|| self.runner.backend.poll(until_s)));
+            let Ok(batch) = polled else { break };
+            self.runner.observer.on_batch(&batch?)?;
         }
+        Ok(())
     }
 
     /// Setpoints `after_s` into the run-down; `None` if the air is to be cut.

@@ -5,6 +5,9 @@ use mapper_core::{
     SampleBatch, Setpoints,
 };
 
+/// Payload of the panic of [`Fault::Panics`].
+pub struct RequestedPanic;
+
 /// A fault, active from its start time on.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(dead_code, reason = "each program of tests uses some of them")]
@@ -266,12 +269,12 @@ impl<B: Backend> Backend for FaultyBackend<B> {
         self.inner.set(setpoints)
     }
 
-    #[allow(clippy::panic, reason = "a panic on demand is what it is for")]
+    #[allow(clippy::panic, reason = "a panic on request is what it is for")]
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
         self.unreachable("poll")?;
         for (_, fault) in self.active_faults() {
             match fault {
-                Fault::Panics => panic!("a backend that panics on demand"),
+                Fault::Panics => std::panic::panic_any(RequestedPanic),
                 Fault::Trips { .. } if !self.tripped => self.inner.make_safe()?,
                 _ => {}
             }

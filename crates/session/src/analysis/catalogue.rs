@@ -5,9 +5,7 @@ use crate::recording::files::read_at_most;
 use crate::recording::journal::{JournalPart, is_run_now, read_journal};
 use crate::recording::run_directory::{self, CAMPAIGN, EXECUTED, JOURNAL, PLAN, POINTS, RECORDING};
 use crate::{MapFile, Registry, SessionError};
-use mapper_core::{
-    CompressorMap, IdentifiedPoint, MapDescription, MapFormat, Plan, PlanStep, StepMarker, Verdict,
-};
+use mapper_core::{CompressorMap, IdentifiedPoint, MapDescription, MapFormat, Plan, StepMarker, Verdict};
 use mapper_history::{CatalogueFilter, CataloguedRun, History, RunSummary};
 use mapper_maps::{MapComparison, compare, repeated_jumps};
 use mapper_recording::recording_program;
@@ -155,7 +153,8 @@ fn read_summary(folder: &Path) -> Result<RunSummary, SessionError> {
         let usable = stored.points.iter().filter(|point| point.verdict != Verdict::Unusable);
         let widths = usable.filter_map(|point| Some(0.5 * (point.eta_high? - point.eta_low?)));
         run.worst_eta_half_width = widths.max_by(f64::total_cmp);
-        let markers: Vec<StepMarker> = plan.iter().flat_map(|plan| &plan.steps).map(planned_marker).collect();
+        let markers: Vec<StepMarker> =
+            plan.iter().flat_map(|plan| &plan.steps).map(StepMarker::from).collect();
         let changes = repeated_jumps(&markers, &stored.points);
         run.drift = changes.iter().map(|jump| jump.eta_change).max_by(|a, b| a.abs().total_cmp(&b.abs()));
     }
@@ -169,19 +168,6 @@ fn plan_of(folder: &Path) -> Option<Plan> {
 
 fn json_of<T: serde::de::DeserializeOwned>(folder: &Path, name: &str) -> Option<T> {
     serde_json::from_slice(&read_at_most(&folder.join(name), MAX_RESULTS_BYTES).ok()?).ok()
-}
-
-fn planned_marker(step: &PlanStep) -> StepMarker {
-    StepMarker {
-        index: step.index,
-        kind: step.kind,
-        start_s: step.start_s,
-        end_s: step.start_s + step.dwell_s,
-        from: step.from,
-        to: Some(step.to),
-        p3_pa: step.p3_pa,
-        valve_opening_ratio: step.to.valve_opening_ratio,
-    }
 }
 
 /// A catalogued run with its folder, which lies below the indexed directory.

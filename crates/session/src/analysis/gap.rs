@@ -137,17 +137,9 @@ impl Session<'_> {
         found: &Found,
     ) -> Result<Vec<Expected>, SessionError> {
         let model = nominal_model(campaign)?;
-        let steps = plan(campaign, &model)?.steps.into_iter().map(|step| StepMarker {
-            index: step.index,
-            kind: step.kind,
-            start_s: step.start_s,
-            end_s: step.start_s + step.dwell_s,
-            from: step.from,
-            to: Some(step.to),
-            p3_pa: step.p3_pa,
-            valve_opening_ratio: step.to.valve_opening_ratio,
-        });
-        let planned = Recording { steps: steps.collect(), ..Recording::default() };
+        let steps = plan(campaign, &model)?.steps;
+        let planned =
+            Recording { steps: steps.iter().map(StepMarker::from).collect(), ..Recording::default() };
         let rig = of_rig(planned, model, identification_with(campaign, map), campaign);
         Ok(found.forecast(rig, effects)?)
     }

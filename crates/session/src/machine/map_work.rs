@@ -60,6 +60,34 @@ fn fitted_note(fitted: bool) -> &'static str {
     if fitted { "; the format is a table, so the map was fitted" } else { "" }
 }
 
+/// Writes a compressor map, fitted first if the format needs it, and says what was written.
+fn write_derived(
+    map: CompressorMap,
+    out: MapOut<'_>,
+    format: &'static MapFormat,
+) -> Result<(Document, Value), SessionError> {
+    let (map, fitted_here) = write_map_fitted_if_needed(out.path, format, map, out.existing)?;
+    let points: usize = map.lines.iter().map(|line| line.points.len()).sum();
+    let (lines, reference) = (map.lines.len(), map.reference);
+    let mut document = Document::default();
+    document.text(format!(
+        "{}: {}, {points} points on {lines} speed lines, corrected to {reference}{}",
+        out.path.display(),
+        format.name,
+        fitted_note(fitted_here)
+    ));
+    let json = json!({
+        "file": out.path,
+        "format": format.name,
+        "reference": reference,
+        "efficiency": map.efficiency,
+        "lines": lines,
+        "points": points,
+        "fitted": map.fitted.is_some(),
+    });
+    Ok((document, json))
+}
+
 pub(crate) fn warnings(path: &Path, remarks: &[ImportRemark]) -> Vec<String> {
     remarks.iter().map(|remark| format!("{}: {}", path.display(), remark.message())).collect()
 }
@@ -180,6 +208,7 @@ impl Registry {
         to_reference: Option<ReferenceState>,
         efficiencies: (Option<EfficiencyDefinition>, Option<EfficiencyDefinition>),
     ) -> Result<MapWork, SessionError> {
+        let format = out.format(self)?;
         match self.read_map_file(path, user_description)? {
             MapFile::Compressor(imported) => {
                 let mut map = imported.map;
@@ -192,7 +221,7 @@ impl Registry {
                     (None, Some(_)) => return Err(MapWorkError::NoDefinition.into()),
                     (_, None) => map.efficiency = efficiency,
                 }
-                let (document, json) = self.write_derived(map, out)?;
+                let (document, json) = write_derived(map, out, format)?;
                 Ok(MapWork { document, json, warnings: warnings(path, &imported.remarks) })
             }
             MapFile::Turbine(imported) => {
@@ -203,7 +232,6 @@ impl Registry {
                 if let Some((_, property)) = requested.into_iter().find(|(requested, _)| *requested) {
                     return Err(MapWorkError::NotOfTurbine { path: path.to_owned(), property }.into());
                 }
-                let format = out.format(self)?;
                 let (map, fitted_here) = write_turbine_fitted_if_needed(path, out, format, imported.map)?;
                 let (points, lines) = (map.points.len(), map.lines().count());
                 let mut document = Document::default();
@@ -233,10 +261,11 @@ impl Registry {
         scale: MapScale,
         out: MapOut<'_>,
     ) -> Result<MapWork, SessionError> {
+        let format = out.format(self)?;
         let imported = self.inspect_map(path, user_description)?;
         let map =
             scaled(imported.map, scale).map_err(|source| MapWorkError::NotScaled(path.to_owned(), source))?;
-        let (mut document, mut json) = self.write_derived(map, out)?;
+        let (mut document, mut json) = write_derived(map, out, format)?;
         document.text(format!(
             "Flow times {:.4}, PR - 1 times {:.4}, efficiency times {:.4}, speed times {:.4}. The intervals are those of the points, in proportion; \
              the error of the scaling is not in them.",
@@ -252,40 +281,16 @@ impl Registry {
         [first, second]: [(&Path, &MapDescription); 2],
         out: MapOut<'_>,
     ) -> Result<MapWork, SessionError> {
+        let format = out.format(self)?;
         let maps = [self.inspect_map(first.0, first.1)?, self.inspect_map(second.0, second.1)?];
         let merged = merge(&maps[0].map, &maps[1].map);
         let mut document = merged.document();
         let (lines, seam) = (serde_json::to_value(&merged.lines)?, serde_json::to_value(&merged.seam)?);
-        let (written, mut json) = self.write_derived(merged.map, out)?;
+        let (written, mut json) = write_derived(merged.map, out, format)?;
         document.append(written);
         (json["of_lines"], json["seam"]) = (lines, seam);
         let warnings = [warnings(first.0, &maps[0].remarks), warnings(second.0, &maps[1].remarks)].concat();
         Ok(MapWork { document, json, warnings })
-    }
-
-    /// Writes a compressor map, fitted first if the format needs it, and says what was written.
-    fn write_derived(&self, map: CompressorMap, out: MapOut<'_>) -> Result<(Document, Value), SessionError> {
-        let format = out.format(self)?;
-        let (map, fitted_here) = write_map_fitted_if_needed(out.path, format, map, out.existing)?;
-        let points: usize = map.lines.iter().map(|line| line.points.len()).sum();
-        let (lines, reference) = (map.lines.len(), map.reference);
-        let mut document = Document::default();
-        document.text(format!(
-            "{}: {}, {points} points on {lines} speed lines, corrected to {reference}{}",
-            out.path.display(),
-            format.name,
-            fitted_note(fitted_here)
-        ));
-        let json = json!({
-            "file": out.path,
-            "format": format.name,
-            "reference": reference,
-            "efficiency": map.efficiency,
-            "lines": lines,
-            "points": points,
-            "fitted": map.fitted.is_some(),
-        });
-        Ok((document, json))
     }
 
     /// Compares two maps of the same machine. `picture` is a new file that shows both.

@@ -87,6 +87,8 @@ pub enum Entry {
     /// A step is complete and recorded. Holds its index in the plan, stored as the step number.
     StepSaved(#[serde(with = "mapper_core::test_plan::step_number")] usize),
     Ended(RunEnding),
+    /// The results of all parts up to this one are written.
+    Results,
 }
 
 pub struct Journal {
@@ -135,6 +137,8 @@ pub struct JournalPart {
     pub completed: bool,
     /// How it ended; `None` if nothing wrote that.
     pub ending: Option<RunEnding>,
+    /// Whether the results contain it.
+    pub has_results: bool,
     /// Whether its recording cannot be read and contained steps or a soak that no other part has.
     pub unreadable: bool,
     /// Steps that the journal lists and no recording contains.
@@ -180,12 +184,14 @@ pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
                     saved: BTreeSet::new(),
                     completed: false,
                     ending: None,
+                    has_results: false,
                     unreadable: false,
                     lost: BTreeSet::new(),
                     lost_soak: false,
                 });
             }
             (Ok(Entry::Soaked), Some(part)) => part.soaked = true,
+            (Ok(Entry::Results), Some(part)) => part.has_results = true,
             (Ok(Entry::StepSaved(index)), Some(part)) => {
                 part.saved.insert(index);
             }

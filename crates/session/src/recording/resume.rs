@@ -128,9 +128,10 @@ impl InterruptedRun {
         if let Some(lost) = lost.filter(|_| !self.repeats_lost) {
             return Err(SessionError::LostSteps { run: self.directory.clone(), lost });
         }
-        // The page is written last. If it is missing, the disk was full or the program was killed.
+        // Results may be those of an earlier part, or gone since.
         let results = [run_directory::POINTS, run_directory::REPORT, run_directory::PAGE];
-        let written = results.iter().all(|name| self.directory.join(name).exists());
+        let exist = results.iter().all(|name| self.directory.join(name).exists());
+        let written = exist && self.parts.last().is_some_and(|part| part.has_results);
         if written && self.is_complete(campaign, plan) {
             return not_resumable("all its steps and results are complete".to_owned());
         }

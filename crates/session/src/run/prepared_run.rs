@@ -277,7 +277,7 @@ impl PreparedRun<'_> {
         check_room(&directory, soak_s(self.request.campaign) + self.plan.duration_s(), rig)?;
         let mut name = run_directory::RECORDING.to_owned();
         if let Some(interrupted) = &self.request.resume {
-            // A kill before the journal named its recording leaves one that is no part; one that is gone keeps its name.
+            // A kill before the journal named its recording leaves one that belongs to no part; one that is gone keeps its name.
             let is_used = |name: &String| {
                 directory.join(name).exists() || interrupted.parts.iter().any(|part| part.recording == *name)
             };
@@ -325,7 +325,12 @@ impl PreparedRun<'_> {
         let what = "identifying the recorded steps".to_owned();
         session.send(SessionEvent::Progress { done_ratio: 0.0, what });
         let (campaign, started_ns) = (self.request.campaign, self.request.started_ns);
-        session.results(campaign, &executed?, ending, started_ns, directory, parts)
+        let results = session.results(campaign, &executed?, ending, started_ns, directory, parts)?;
+        let path = directory.join(run_directory::JOURNAL);
+        Journal::open(&path, false, None)
+            .and_then(|mut journal| journal.write(&Entry::Results))
+            .map_err(SessionError::file("write", &path))?;
+        Ok(results)
     }
 
     /// Identifies a run that was interrupted after its last step. Only the map is missing, so the rig is not used.

@@ -1,4 +1,4 @@
-//! The invariants: safe or declared unsafe, nothing lost or altered, the truth told, a resumed run whole.
+//! The invariants: safe or declared unsafe, nothing lost or altered, the truth stated, a resumed run whole.
 
 use super::faulty_backend::Fault;
 use super::scenario::{Damage, Life, Scenario};
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// What the program says of its end.
 #[derive(Debug)]
 #[allow(dead_code, reason = "the errors are shown when a seed fails")]
-pub enum Told {
+pub enum StatedEnd {
     Ended(RunEnding),
     /// Complete, but its results could not be written.
     NoResults(String),
@@ -29,28 +29,28 @@ pub enum Told {
     Refused(Box<SessionError>),
 }
 
-impl Told {
+impl StatedEnd {
     pub fn is_complete(&self) -> bool {
-        matches!(self, Told::Ended(RunEnding::Completed))
+        matches!(self, StatedEnd::Ended(RunEnding::Completed))
     }
 
     /// Whether the rig has to be inspected before the next run.
     fn locks_out(&self) -> bool {
         match self {
-            Told::Ended(RunEnding::Tripped(trip)) => trip.reaction == Reaction::Latch,
-            Told::Failed { is_unknown, .. } | Told::NotArmed { is_unknown, .. } => *is_unknown,
+            StatedEnd::Ended(RunEnding::Tripped(trip)) => trip.reaction == Reaction::Latch,
+            StatedEnd::Failed { is_unknown, .. } | StatedEnd::NotArmed { is_unknown, .. } => *is_unknown,
             _ => false,
         }
     }
 
     pub fn word(&self) -> String {
         match self {
-            Told::Ended(end) => serde_json::to_value(end).unwrap()["code"].as_str().unwrap().to_owned(),
-            Told::NoResults(_) => "no results".to_owned(),
-            Told::Failed { is_unknown: true, .. } => "failed, rig unknown".to_owned(),
-            Told::Failed { .. } => "failed".to_owned(),
-            Told::NotArmed { .. } => "not armed".to_owned(),
-            Told::Refused(_) => "refused".to_owned(),
+            StatedEnd::Ended(end) => serde_json::to_value(end).unwrap()["code"].as_str().unwrap().to_owned(),
+            StatedEnd::NoResults(_) => "no results".to_owned(),
+            StatedEnd::Failed { is_unknown: true, .. } => "failed, rig unknown".to_owned(),
+            StatedEnd::Failed { .. } => "failed".to_owned(),
+            StatedEnd::NotArmed { .. } => "not armed".to_owned(),
+            StatedEnd::Refused(_) => "refused".to_owned(),
         }
     }
 }
@@ -80,7 +80,10 @@ pub fn refusal(
     let recording_damaged = damages.iter().any(|damage| matches!(damage, Damage::Cut(_) | Damage::Gone));
     let journal_damaged =
         damages.iter().any(|damage| matches!(damage, Damage::JournalCut(_) | Damage::JournalGone));
-    let wrong = || Refusal::Wrong(format!("refused without a reason: {error}"));
+    let wrong = || {
+        let points = run.map(|run| whole(run, points));
+        Refusal::Wrong(format!("refused without a reason: {error}; points: {points:?}"))
+    };
     let has_parts = run.is_some_and(|run| !parts(run).is_empty());
     match error {
         SessionError::RigLockedOut { .. } if status.latch.is_some() => Refusal::Acknowledge,
@@ -122,8 +125,8 @@ fn ns(t_s: f64) -> i64 {
 
 /// Checks one life: `live` is the folder of its files.
 pub fn life(scenario: &Scenario, life: &Life, lived: &Lived, live: &Path) -> Result<(), String> {
-    let Lived { told, ledger, .. } = lived;
-    let because = |what: String| Err(format!("{what}\ntold: {told:?}\nkilled: {}", lived.is_killed));
+    let Lived { stated, ledger, .. } = lived;
+    let because = |what: String| Err(format!("{what}\ntold: {stated:?}\nkilled: {}", lived.is_killed));
     if let Some(wrong) = ledger.wrong.first() {
         return because(wrong.clone());
     }
@@ -139,15 +142,15 @@ pub fn life(scenario: &Scenario, life: &Life, lived: &Lived, live: &Path) -> Res
 }
 
 fn safe(scenario: &Scenario, life: &Life, lived: &Lived, live: &Path) -> Result<(), String> {
-    let Lived { told, ledger, .. } = lived;
+    let Lived { stated, ledger, .. } = lived;
     // A safe command that is acknowledged without effect is not noticed: the safe state was commanded.
     let is_deaf = life.faults.iter().any(|(_, fault)| *fault == Fault::NotMadeSafe);
-    if ledger.air_on && !told.locks_out() && !is_deaf {
+    if ledger.air_on && !stated.locks_out() && !is_deaf {
         return Err("the air is on, and the run does not say so".to_owned());
     }
     let status = RigStates::new(&live.join("states")).status(RIG).map_err(|error| error.to_string())?;
-    if scenario.is_exclusive && (ledger.was_on || !matches!(told, Told::Refused(_))) {
-        if status.latch.is_some() != told.locks_out() {
+    if scenario.is_exclusive && (ledger.was_on || !matches!(stated, StatedEnd::Refused(_))) {
+        if status.latch.is_some() != stated.locks_out() {
             return Err(format!("the lockout is {:?}", status.latch.is_some()));
         }
         if status.owner.is_some() || status.in_use {
@@ -169,38 +172,38 @@ fn safe(scenario: &Scenario, life: &Life, lived: &Lived, live: &Path) -> Result<
         .iter()
         .filter(|(_, fault)| must_end(fault) && !(life.is_real_time && *fault == Fault::Reordered));
     let begin_s = ending.map(|(begin_s, _)| *begin_s).fold(f64::INFINITY, f64::min);
-    if told.is_complete() && begin_s + 6.0 < ledger.now_s {
+    if stated.is_complete() && begin_s + 6.0 < ledger.now_s {
         return Err(format!("a fault at {begin_s} s did not end the run"));
     }
     // Age, a poll, and the run-down of the lab.
     let latest_s = begin_s + 4.0 + 1.5 + 20.0 + 2.0;
-    if !told.locks_out() && ledger.was_on && ledger.cut_s > latest_s && !is_deaf {
+    if !stated.locks_out() && ledger.was_on && ledger.cut_s > latest_s && !is_deaf {
         return Err(format!("a fault at {begin_s} s, the air off at {} s", ledger.cut_s));
     }
     Ok(())
 }
 
 fn told_truly(life: &Life, lived: &Lived) -> Result<(), String> {
-    let Lived { told, ledger, .. } = lived;
+    let Lived { stated, ledger, .. } = lived;
     let fault_by = |t_s: f64| life.faults.iter().any(|(begin_s, _)| *begin_s <= t_s + 1.5);
-    let is_true = match told {
-        Told::Ended(RunEnding::Completed) => true,
-        Told::Ended(RunEnding::Interrupted { .. }) => ledger.stopped_s.is_some(),
-        Told::Ended(RunEnding::Tripped(trip)) => fault_by(trip.t_s),
-        Told::Ended(_) => false,
-        Told::NoResults(_) => ledger.disk_failed,
-        Told::Failed { .. } => {
+    let is_true = match stated {
+        StatedEnd::Ended(RunEnding::Completed) => true,
+        StatedEnd::Ended(RunEnding::Interrupted { .. }) => ledger.stopped_s.is_some(),
+        StatedEnd::Ended(RunEnding::Tripped(trip)) => fault_by(trip.t_s),
+        StatedEnd::Ended(_) => false,
+        StatedEnd::NoResults(_) => ledger.disk_failed,
+        StatedEnd::Failed { .. } => {
             ledger.failed_s.is_some()
                 || ledger.disk_failed
                 || life.faults.iter().any(|(_, fault)| *fault == Fault::Panics)
         }
-        Told::NotArmed { .. } => life.arm_fails.is_some(),
-        Told::Refused(_) => ledger.disk_failed,
+        StatedEnd::NotArmed { .. } => life.arm_fails.is_some(),
+        StatedEnd::Refused(_) => ledger.disk_failed,
     };
     if !is_true {
         return Err("the stated end has no cause".to_owned());
     }
-    if life.is_undisturbed() && !told.is_complete() {
+    if life.is_undisturbed() && !stated.is_complete() {
         return Err("an undisturbed run is not complete".to_owned());
     }
     Ok(())
@@ -214,7 +217,7 @@ fn is_garbled(life: &Life) -> bool {
 }
 
 fn recorded(life: &Life, lived: &Lived, part: &Part) -> Result<(), String> {
-    let Lived { told, ledger, .. } = lived;
+    let Lived { stated, ledger, .. } = lived;
     let read = read_recording(&part.recording, &ChannelMap::native(), &ReadOptions::default());
     let first_s = ledger.received.first().map_or(0.0, |(t_s, _)| *t_s);
     let last_s = ledger.received.last().map_or(0.0, |(t_s, _)| *t_s);
@@ -244,9 +247,9 @@ fn recorded(life: &Life, lived: &Lived, part: &Part) -> Result<(), String> {
     }
     if let (Some(ended), false) = (&part.ended, lived.is_killed) {
         let code = ended["code"].as_str().unwrap_or_default();
-        let same = match told {
-            Told::Ended(end) => serde_json::to_value(end).unwrap()["code"] == code,
-            Told::NoResults(_) => code == "completed",
+        let same = match stated {
+            StatedEnd::Ended(end) => serde_json::to_value(end).unwrap()["code"] == code,
+            StatedEnd::NoResults(_) => code == "completed",
             _ => code == "failed",
         };
         if !same {
@@ -285,10 +288,14 @@ fn samples(ledger: &Ledger, report: &ReadReport, is_killed: bool) -> Result<(), 
             return Err(format!("{channel} at {} s was received and is not recorded", *t_ns as f64 / 1e9));
         }
     }
-    let received_ns = ledger.received.last().map_or(0, |(t_s, _)| ns(*t_s));
-    if is_killed && !ledger.disk_failed && received_ns - last_ns.max(0) > 2_200_000_000 {
-        let (received_s, last_s) = (received_ns as f64 / 1e9, last_ns as f64 / 1e9);
-        return Err(format!("killed at {received_s} s, recorded until {last_s} s"));
+    // Between two readings that are further apart the rig was silent, so that nothing was lost.
+    let lost: Vec<i64> =
+        ledger.received.iter().map(|(t_s, _)| ns(*t_s)).filter(|t_ns| *t_ns > last_ns).collect();
+    let lost_ns: i64 =
+        lost.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap_ns| *gap_ns < 1_000_000_000).sum();
+    if is_killed && !ledger.disk_failed && lost_ns > 2_200_000_000 {
+        let (lost_s, last_s) = (lost_ns as f64 / 1e9, last_ns.max(0) as f64 / 1e9);
+        return Err(format!("a kill lost {lost_s} s of readings, recorded until {last_s} s"));
     }
     Ok(())
 }

@@ -1,5 +1,5 @@
 //! Deterministic simulation of whole runs on the virtual lab: a seed decides campaign, time, faults, stops and kills; a checker compares what the
-//! program says and leaves behind with what happened. `MAPPER_CHAOS_SEED` repeats one seed, `MAPPER_CHAOS_SECONDS` lasts longer.
+//! program states and leaves behind with what happened. `MAPPER_CHAOS_SEED` repeats one seed, `MAPPER_CHAOS_SECONDS` lasts longer.
 
 mod check;
 #[path = "../../../runner/tests/faults/faulty_backend.rs"]
@@ -18,7 +18,9 @@ use std::time::{Duration, Instant};
 const SEEDS: std::ops::Range<u64> = 0..24;
 
 fn from_environment(name: &str) -> Option<u64> {
-    std::env::var(name).ok().map(|text| text.parse().unwrap_or_else(|_| panic!("{name}={text} is no number")))
+    std::env::var(name)
+        .ok()
+        .map(|text| text.parse().unwrap_or_else(|_| panic!("{name}={text} is not a number")))
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! One simulation: lives of the program, each with its own faults, over the same files.
 
-use super::check::{self, Told};
+use super::check::{self, StatedEnd};
 use super::scenario::{Damage, Extent, Kind, Life, Scenario};
 use super::world::{Ledger, RIG, SimulatedRig, World};
 use mapper_campaign::Campaign;
@@ -43,7 +43,7 @@ pub struct Outcome {
 
 /// One life, as it went.
 pub struct Lived {
-    pub told: Told,
+    pub stated: StatedEnd,
     pub ledger: Ledger,
     pub is_killed: bool,
     /// Steps that ended and were not abandoned, as reported.
@@ -54,7 +54,7 @@ pub struct Lived {
 }
 
 pub fn is_on_demand(payload: &(dyn std::any::Any + Send)) -> bool {
-    payload.downcast_ref::<&str>().is_some_and(|text| text.contains("on demand"))
+    payload.is::<super::faulty_backend::RequestedPanic>()
 }
 
 fn campaign(kind: Kind, backend: &str) -> (Campaign, String) {
@@ -120,9 +120,9 @@ impl Simulator {
                 let lived = simulator.live(&scenario, &Life::undisturbed(is_real_time), &folder, None);
                 let run = lived.directory.clone().unwrap();
                 assert!(
-                    matches!(lived.told, Told::Ended(mapper_core::RunEnding::Completed)),
+                    matches!(lived.stated, StatedEnd::Ended(mapper_core::RunEnding::Completed)),
                     "{:?}",
-                    lived.told
+                    lived.stated
                 );
                 let prepared = simulator.campaigns.get_mut(&kind).unwrap();
                 prepared.extents[usize::from(is_real_time)] = lived.extent;
@@ -190,25 +190,26 @@ impl Simulator {
             let clock: &mut dyn Clock = if life.is_real_time { &mut paced } else { &mut unpaced };
             prepared.run_paced(&session, clock, life.is_real_time)
         };
-        let told = match run() {
+        let stated = match run() {
             Ok(outcome) => match (outcome.end, outcome.results) {
                 (Ok(end), results) => {
                     let is_complete = results.is_ok();
-                    let told = Told::Ended(end);
-                    if is_complete || !told.is_complete() {
-                        told
+                    let stated = StatedEnd::Ended(end);
+                    if is_complete || !stated.is_complete() {
+                        stated
                     } else {
-                        Told::NoResults(results.err().unwrap().to_string())
+                        StatedEnd::NoResults(results.err().unwrap().to_string())
                     }
                 }
-                (Err(error), _) => {
-                    Told::Failed { is_unknown: error.leaves_rig_state_unknown(), error: error.to_string() }
-                }
+                (Err(error), _) => StatedEnd::Failed {
+                    is_unknown: error.leaves_rig_state_unknown(),
+                    error: error.to_string(),
+                },
             },
             Err(SessionError::NotArmed(error)) => {
-                Told::NotArmed { is_unknown: error.leaves_rig_state_unknown(), error: error.to_string() }
+                StatedEnd::NotArmed { is_unknown: error.leaves_rig_state_unknown(), error: error.to_string() }
             }
-            Err(error) => Told::Refused(Box::new(error)),
+            Err(error) => StatedEnd::Refused(Box::new(error)),
         };
         let (calls, writes) = world.count();
         let is_killed = world.is_killed();
@@ -223,7 +224,7 @@ impl Simulator {
             std::fs::read_dir(run).unwrap().flatten().map(|file| file.metadata().unwrap().len()).sum()
         });
         let extent = Extent { calls, writes, bytes, duration_s: ledger.now_s };
-        Lived { told, is_killed, ended: ended.into_inner().unwrap(), directory, extent, ledger }
+        Lived { stated, is_killed, ended: ended.into_inner().unwrap(), directory, extent, ledger }
     }
 
     /// Simulates what follows from a seed.
@@ -253,7 +254,7 @@ impl Simulator {
             let lived = loop {
                 let lived =
                     self.live(scenario, life, folder, resume.as_deref().map(|run| (run, repeats_lost)));
-                let Told::Refused(error) = &lived.told else { break lived };
+                let StatedEnd::Refused(error) = &lived.stated else { break lived };
                 if lived.is_killed {
                     break lived;
                 }
@@ -283,7 +284,7 @@ impl Simulator {
             outcome.kills += usize::from(lived.is_killed);
             was_killed |= lived.is_killed;
             check::life(scenario, life, &lived, &folder.join("live"))?;
-            if lived.told.is_complete() && !lived.is_killed {
+            if lived.stated.is_complete() && !lived.is_killed {
                 return check::whole(&lived.directory.unwrap(), points);
             }
             if let (true, Some(run), Some(damage)) = (lived.is_killed, &lived.directory, life.damage)
@@ -303,7 +304,7 @@ impl Simulator {
 
 impl Lived {
     fn word(&self) -> String {
-        if self.is_killed { "killed".to_owned() } else { self.told.word() }
+        if self.is_killed { "killed".to_owned() } else { self.stated.word() }
     }
 }
 

@@ -98,7 +98,7 @@ struct State {
     driven_by: Option<usize>,
     /// The driver has lost its host and makes the rig safe by itself.
     driver_cuts: bool,
-    /// A run has ended so that the rig must be inspected, and nobody has acknowledged it.
+    /// A run has ended so that the rig must be inspected, and that is not acknowledged.
     inspect: bool,
     /// The run that was killed and neither resumed nor acknowledged since.
     abandoned: Option<u8>,

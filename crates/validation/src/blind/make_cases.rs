@@ -81,7 +81,7 @@ pub fn record(
 /// Key of a cause that the library does not have, with a sentence.
 pub const OUTSIDE_NAME: &str = "outside_catalogue";
 
-/// What somebody builds into a rig; nothing at all is a rig as it is.
+/// What a person builds into a rig; without any cause it is a rig as it is.
 #[derive(Debug, Clone, Copy)]
 pub struct Planted<'a> {
     /// Name of the case.

@@ -109,7 +109,7 @@ impl Make {
     }
 }
 
-/// Seal what somebody builds into a real rig, before it is recorded, and print the seal; the recording is then copied to DIR/NAME.mcap
+/// Seal what a colleague builds into a real rig, before it is recorded, and print the seal; the recording is then copied to DIR/NAME.mcap
 #[derive(Debug, Args)]
 pub struct Plant {
     /// Directory for the case

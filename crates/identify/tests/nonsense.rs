@@ -161,15 +161,32 @@ fn draws() -> Vec<u64> {
     asked.split(',').flat_map(draws).collect()
 }
 
-#[test]
-fn no_doctored_recording_gives_a_good_point_that_is_wrong() {
+/// Tests that share the table, so that none lasts long.
+const PARTS: usize = 3;
+
+fn no_good_point_is_wrong(part: usize) {
     let clean = campaign(&grid(), 100.0, Machine::default());
-    let bad: Vec<String> = draws().into_iter().flat_map(|draw| of_draw(draw, &clean)).collect();
+    let bad: Vec<String> = draws().into_iter().flat_map(|draw| of_draw(draw, &clean, part)).collect();
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
-/// The failures of one draw of noise and offsets.
-fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
+#[test]
+fn no_doctored_recording_gives_a_good_point_that_is_wrong() {
+    no_good_point_is_wrong(0);
+}
+
+#[test]
+fn no_doctored_recording_of_the_second_third_does() {
+    no_good_point_is_wrong(1);
+}
+
+#[test]
+fn no_doctored_recording_of_the_last_third_does() {
+    no_good_point_is_wrong(2);
+}
+
+/// The failures of one draw of noise and offsets, on one part of the table.
+fn of_draw(seed: u64, clean: &Campaign, part: usize) -> Vec<String> {
     let fault_free = fault_free(seed, clean);
     let base = METHODS.map(|method| score(&fault_free.recording, &fault_free, method));
     println!("draw {seed}\n  {:35} {}", "fault-free", base.map(|score| cell(&score)).join(" | "));
@@ -179,7 +196,9 @@ fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
         .iter()
         .enumerate()
         .filter(|(row, (name, _))| is_whole || row.is_multiple_of(3) || HARMLESS.contains(name))
-        .map(|(_, doctored)| doctored)
+        .enumerate()
+        .filter(|(position, _)| position % PARTS == part)
+        .map(|(_, (_, doctored))| doctored)
         .collect();
     let rows = mapper_numerics::parallel::map(&doctored, |(name, doctor)| {
         let mut recording = fault_free.recording.clone();
@@ -197,7 +216,7 @@ fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
         let mark = if wrong(scores) { "X" } else { " " };
         println!("{mark} {name:35} {}", scores.map(|score| cell(&score)).join(" | "));
     }
-    assert!(rows.len() >= 40);
+    assert!(rows.len() >= 15);
     let describe = |what: &str, scores: &[Score; 3]| {
         format!("draw {seed}, {what}: {}", scores.map(|score| cell(&score)).join(" | "))
     };

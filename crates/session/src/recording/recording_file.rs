@@ -111,7 +111,7 @@ impl Recorded {
     }
 }
 
-/// The recordings of a run, each with its valid steps (of the last all complete ones); no empty parts, no repeated data of a simulator.
+/// The recordings of a run, each with its valid steps (of the last all complete ones); no empty parts, nothing twice.
 pub(crate) fn merge_parts<'a>(
     parts: impl ExactSizeIterator<Item = ((bool, Option<&'a BTreeSet<usize>>), Recorded)>,
 ) -> Vec<Recorded> {
@@ -126,8 +126,17 @@ pub(crate) fn merge_parts<'a>(
                 continue;
             }
         }
-        let series = &recorded.read.recording.series;
-        all.retain(|earlier| earlier.read.recording.series != *series || series.is_empty());
+        let Recording { series, steps, .. } = &mut recorded.read.recording;
+        // What a simulator has repeated is one recording, with the steps of both.
+        all.retain(|Recorded { read: ReadReport { recording: earlier, .. }, .. }| {
+            let is_repeated = !series.is_empty() && earlier.series == *series;
+            for step in earlier.steps.iter().filter(|_| is_repeated) {
+                steps.retain(|later| later.end_s <= step.start_s || step.end_s <= later.start_s);
+                steps.push(*step);
+            }
+            steps.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
+            !is_repeated
+        });
         all.push(recorded);
     }
     all

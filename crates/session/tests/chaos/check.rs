@@ -126,13 +126,13 @@ fn ns(t_s: f64) -> i64 {
 /// Checks one life: `live` is the folder of its files.
 pub fn life(scenario: &Scenario, life: &Life, lived: &Lived, live: &Path) -> Result<(), String> {
     let Lived { stated, ledger, .. } = lived;
-    let because = |what: String| Err(format!("{what}\ntold: {stated:?}\nkilled: {}", lived.is_killed));
+    let because = |what: String| Err(format!("{what}\nstated: {stated:?}\nkilled: {}", lived.is_killed));
     if let Some(wrong) = ledger.wrong.first() {
         return because(wrong.clone());
     }
     if !lived.is_killed {
         safe(scenario, life, lived, live).or_else(because)?;
-        told_truly(life, lived).or_else(because)?;
+        stated_truly(life, lived).or_else(because)?;
     }
     let Some(run) = &lived.directory else { return Ok(()) };
     let parts = parts(run);
@@ -149,7 +149,19 @@ fn safe(scenario: &Scenario, life: &Life, lived: &Lived, live: &Path) -> Result<
         return Err("the air is on, and the run does not say so".to_owned());
     }
     let status = RigStates::new(&live.join("states")).status(RIG).map_err(|error| error.to_string())?;
-    if scenario.is_exclusive && (ledger.was_on || !matches!(stated, StatedEnd::Refused(_))) {
+    // Refused, or only identified, or not armed after a kill: the rig's state stays unknown.
+    let is_without_rig = !ledger.was_on
+        && match stated {
+            StatedEnd::Refused(_) => true,
+            StatedEnd::NotArmed { is_unknown, .. } => lived.was_abandoned && !is_unknown,
+            StatedEnd::Ended(_) | StatedEnd::NoResults(_) | StatedEnd::Failed { .. } => {
+                ledger.received.is_empty()
+            }
+        };
+    if scenario.is_exclusive && is_without_rig && status.owner.is_some() != lived.was_abandoned {
+        return Err("the rig was not used, and its owner changed".to_owned());
+    }
+    if scenario.is_exclusive && !is_without_rig {
         if status.latch.is_some() != stated.locks_out() {
             return Err(format!("the lockout is {:?}", status.latch.is_some()));
         }
@@ -183,7 +195,7 @@ fn safe(scenario: &Scenario, life: &Life, lived: &Lived, live: &Path) -> Result<
     Ok(())
 }
 
-fn told_truly(life: &Life, lived: &Lived) -> Result<(), String> {
+fn stated_truly(life: &Life, lived: &Lived) -> Result<(), String> {
     let Lived { stated, ledger, .. } = lived;
     let fault_by = |t_s: f64| life.faults.iter().any(|(begin_s, _)| *begin_s <= t_s + 1.5);
     let is_true = match stated {
@@ -193,9 +205,14 @@ fn told_truly(life: &Life, lived: &Lived) -> Result<(), String> {
         StatedEnd::Ended(_) => false,
         StatedEnd::NoResults(_) => ledger.disk_failed,
         StatedEnd::Failed { .. } => {
+            // Times that go back to before the start cannot be recorded.
+            let is_fatal = |fault: &Fault| matches!(fault, Fault::Panics | Fault::Backward(_));
             ledger.failed_s.is_some()
                 || ledger.disk_failed
-                || life.faults.iter().any(|(_, fault)| *fault == Fault::Panics)
+                || life
+                    .faults
+                    .iter()
+                    .any(|(begin_s, fault)| is_fatal(fault) && *begin_s <= ledger.now_s + 1.5)
         }
         StatedEnd::NotArmed { .. } => life.arm_fails.is_some(),
         StatedEnd::Refused(_) => ledger.disk_failed,

@@ -46,6 +46,8 @@ pub struct Lived {
     pub stated: StatedEnd,
     pub ledger: Ledger,
     pub is_killed: bool,
+    /// Whether an earlier run had left the rig without releasing it.
+    pub was_abandoned: bool,
     /// Steps that ended and were not abandoned, as reported.
     pub ended: Vec<StepMarker>,
     /// The directory of the run, if there is one.
@@ -172,6 +174,7 @@ impl Simulator {
             ..Session::new(&registry)
         };
         let (runs, states) = (live.join("runs"), live.join("states"));
+        let was_abandoned = RigStates::new(&states).status(RIG).unwrap().owner.is_some();
         let run = || {
             let resumed = resume.map(|(run, repeats_lost)| {
                 let mut run = InterruptedRun::read(run)?;
@@ -224,7 +227,15 @@ impl Simulator {
             std::fs::read_dir(run).unwrap().flatten().map(|file| file.metadata().unwrap().len()).sum()
         });
         let extent = Extent { calls, writes, bytes, duration_s: ledger.now_s };
-        Lived { stated, is_killed, ended: ended.into_inner().unwrap(), directory, extent, ledger }
+        Lived {
+            stated,
+            is_killed,
+            was_abandoned,
+            ended: ended.into_inner().unwrap(),
+            directory,
+            extent,
+            ledger,
+        }
     }
 
     /// Simulates what follows from a seed.

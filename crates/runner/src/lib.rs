@@ -25,7 +25,7 @@ pub use guards::signal_watch::{SignalWatch, SilenceWatch, UnguardedChannel};
 pub use guards::surge_watch::SurgeWatch;
 pub use run_control::observer::{ObserverError, Operator, Protection, RunError, RunObserver, stated_end};
 pub use run_control::run::Runner;
-pub use run_control::safe_shutdown::MAX_ATTEMPTS;
+pub use run_control::safe_shutdown::{AirStillOn, MAX_ATTEMPTS};
 pub use run_control::speed_control::{ResponseAt, SpeedControl, SpeedControlLimits};
 pub use run_control::transition_control::StandMotion;
 pub use step_source::{PlanSteps, SoakSource, StepSource, StepSourceError};

@@ -1,10 +1,13 @@
 //! The end of a run: stops by the operator, and the safe shutdown after a fault: first the safe state, then the records of the reason.
 
 use crate::guards::guard::{CommandedState, stop_is_due};
-use crate::run_control::observer::{Protection, RunError, stated_end};
+use crate::run_control::observer::{ObserverError, Protection, RunError, RunObserver, stated_end};
 use crate::run_control::run::{Halt, Run, Runner, panic_message};
 use crate::run_control::transition_control::StandMotion;
-use mapper_core::{BackendError, Event, EventKind, GuardName, Reaction, RunEnding, Setpoints};
+use mapper_core::{
+    BackendError, Channel, Event, EventKind, GuardName, Quality, Reaction, RunEnding, SampleBatch, Setpoints,
+    with_unit,
+};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -13,12 +16,86 @@ use std::time::Duration;
 
 /// Time between two setpoints of the run-down, s.
 const STEP_S: f64 = 0.1;
-/// How long the rig is observed after it was made safe, s, one at a time, as a kill may cost: the recording shows that it reached the safe state.
+/// How long the rig is observed after it was made safe, s, one at a time, as a kill may cost: whether it reaches the safe state is recorded.
 const OBSERVATION_S: u8 = 5;
 /// Number of safe-state commands before the rig counts as lost.
 pub const MAX_ATTEMPTS: usize = 3;
 /// Time between two of these commands, s of the run's clock: an interrupted link may recover.
 const PAUSE_S: f64 = 0.5;
+
+/// Share of P3 above P4, or of the speed, that a rig without air must lose while it is observed: a supply that follows
+/// with 60 s loses 8 % in 5 s.
+const MIN_FALL_RATIO: f64 = 0.05;
+/// Least excess of P3 whose fall is judged, Pa: 5 % of it are twice the offset of a transmitter of class 0.1 with 250 kPa.
+const MIN_EXCESS_PA: f64 = 10e3;
+/// Ratio of speeds below which a shaft coasts, whatever P3 reads: without air it loses more than half in 5 s.
+const COASTS_RATIO: f64 = 0.5;
+/// Speed below which a shaft is not driven by its turbine, rpm: a hundredth of what such machines reach.
+const TURNS_RPM: f64 = 1e3;
+
+/// The command that shuts the air off was acknowledged, and a reading shows that it had no effect.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "it acknowledged that its air is off, but {channel} read {} before and reads {} after {OBSERVATION_S} s: the air is on, or the sensor is stuck",
+    with_unit(format!("{before:.0}"), channel.unit()),
+    with_unit(format!("{now:.0}"), channel.unit())
+)]
+pub struct AirStillOn {
+    /// What was read.
+    pub channel: Channel,
+    /// First reading after the command, in the channel's unit.
+    pub before: f64,
+    /// Last reading, in the channel's unit.
+    pub now: f64,
+}
+
+/// Readings of a rig that has acknowledged that its air is off: the first and the last of each.
+#[derive(Debug, Default)]
+struct AirOff {
+    p3_pa: Option<(f64, f64)>,
+    p4_pa: Option<(f64, f64)>,
+    speed_rpm: Option<(f64, f64)>,
+}
+
+impl AirOff {
+    fn read(&mut self, batch: &SampleBatch) {
+        let read = [
+            (Channel::P3, &mut self.p3_pa),
+            (Channel::P4, &mut self.p4_pa),
+            (Channel::ShaftSpeed, &mut self.speed_rpm),
+        ];
+        for (channel, ends) in read {
+            let quality = batch.provenance_of(channel).map_or(&[][..], |from| &from.quality);
+            let values = batch.column(channel).unwrap_or_default().iter().enumerate();
+            let good =
+                values.filter(|(at, value)| value.is_finite() && quality.get(*at) != Some(&Quality::Bad));
+            for (_, value) in good {
+                *ends = Some((ends.map_or(*value, |(first, _)| first), *value));
+            }
+        }
+    }
+
+    /// P3 above P4 (or above its lowest running value) drives the turbine. The speed decides where P3 is not read; a shaft that coasts contradicts
+    /// a P3 that does not fall.
+    fn check(&self, t_s: f64, p3_min_pa: f64) -> Result<(), BackendError> {
+        let still_on = |channel: Channel, (before, now)| {
+            Err(BackendError::Lost { t_s, source: Box::new(AirStillOn { channel, before, now }) })
+        };
+        let coasts = self.speed_rpm.is_some_and(|(before, now)| now < COASTS_RATIO * before);
+        match (self.p3_pa, self.speed_rpm) {
+            (Some((before, now)), _) => {
+                let (excess_pa, fall_pa) =
+                    (before - self.p4_pa.map_or(p3_min_pa, |(_, p4_pa)| p4_pa), before - now);
+                let is_on = excess_pa > MIN_EXCESS_PA && fall_pa < MIN_FALL_RATIO * excess_pa;
+                if is_on && !coasts { still_on(Channel::P3, (before, now)) } else { Ok(()) }
+            }
+            (None, Some((before, now))) if before > TURNS_RPM && now > (1.0 - MIN_FALL_RATIO) * before => {
+                still_on(Channel::ShaftSpeed, (before, now))
+            }
+            _ => Ok(()),
+        }
+    }
+}
 
 /// Contains a panic of an observer, so that the shutdown continues.
 pub(crate) fn catch_panic(report: impl FnOnce() -> Result<(), RunError>) -> Result<(), RunError> {
@@ -62,8 +139,13 @@ impl Run<'_, '_> {
             }
             self.report_reason(step_counts, kind, &message)
         });
-        let safe = self.run_down(start).and_then(|()| self.cut_air());
-        let reported = reported.and_then(|()| catch_panic(|| self.report_safe(safe.as_ref().err())));
+        let mut reported = reported;
+        let acknowledged = self.run_down(start).and_then(|()| self.cut_air());
+        let safe = acknowledged.and_then(|()| self.observe_safe(&mut reported));
+        if let Err(error) = &safe {
+            let message = format!("the rig did not confirm its safe state: {error}");
+            reported = reported.and_then(|()| catch_panic(|| self.report_unconfirmed(message)));
+        }
         stated_end(end, safe, message, reported)
     }
 
@@ -91,24 +173,40 @@ impl Run<'_, '_> {
         Ok(self.pass_notes()?)
     }
 
-    fn report_safe(&mut self, failed: Option<&BackendError>) -> Result<(), RunError> {
+    fn report_unconfirmed(&mut self, message: String) -> Result<(), RunError> {
+        self.report_lockout(&message)?;
+        let event = Event { t_s: self.now_s, kind: EventKind::Latched, message };
+        Ok(self.runner.observer.on_event(&event)?)
+    }
+
+    /// Records how the rig reaches the safe state that it has acknowledged.
+    ///
+    /// # Errors
+    /// The readings show that its air is still on.
+    fn observe_safe(&mut self, reported: &mut Result<(), RunError>) -> Result<(), BackendError> {
         let t_s = self.now_s;
-        if let Some(error) = failed {
-            let message = format!("the rig did not confirm its safe state: {error}");
-            self.report_lockout(&message)?;
-            return Ok(self.runner.observer.on_event(&Event { t_s, kind: EventKind::Latched, message })?);
-        }
+        let mut report = |news: &dyn Fn(&mut dyn RunObserver) -> Result<(), ObserverError>,
+                          run: &mut Self| {
+            if reported.is_ok() {
+                *reported = catch_panic(|| Ok(news(run.runner.observer)?));
+            }
+        };
         let message = "air off, valve open".to_owned();
-        self.runner.observer.on_event(&Event { t_s, kind: EventKind::SafeState, message })?;
+        let event = Event { t_s, kind: EventKind::SafeState, message };
+        report(&|observer| observer.on_event(&event), self);
+        let mut air = AirOff::default();
         for second in 1..=OBSERVATION_S {
-            let until_s = t_s + f64::from(second);
-            self.runner.clock.wait_until(until_s);
-            // The rig is already safe: a panic of the backend here costs only the last seconds of the recording.
-            let polled = catch_unwind(AssertUnwindSafe(|| self.runner.backend.poll(until_s)));
-            let Ok(batch) = polled else { break };
-            self.runner.observer.on_batch(&batch?)?;
+            self.now_s = t_s + f64::from(second);
+            // A rig that has acknowledged and cannot be read any more counts as safe.
+            let polled = catch_unwind(AssertUnwindSafe(|| {
+                self.runner.clock.wait_until(self.now_s);
+                self.runner.backend.poll(self.now_s)
+            }));
+            let Ok(Ok(batch)) = polled else { break };
+            report(&|observer| observer.on_batch(&batch), self);
+            air.read(&batch);
         }
-        Ok(())
+        if self.sent.is_some() { air.check(t_s, self.protection.p3_min_pa) } else { Ok(()) }
     }
 
     /// Setpoints `after_s` into the run-down; `None` if the air is to be cut.

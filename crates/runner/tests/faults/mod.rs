@@ -10,12 +10,12 @@ use faulty_driver::faulty_backend::{Fault, FaultyBackend};
 use faulty_driver::{FAULT_S, lab};
 use mapper_backends::virtual_lab::VirtualLab;
 use mapper_core::{
-    Backend, Channel, EventKind, FrozenLimit, GuardName, GuardSet, Plan, Reaction, RunEnding, SafeTrajectory,
-    SignalGuard, SpeedBand, SurgeVariation, UnpacedClock,
+    Backend, BackendError, Channel, EventKind, FrozenLimit, GuardName, GuardSet, Plan, Reaction, RunEnding,
+    SafeTrajectory, SignalGuard, SpeedBand, SurgeVariation, UnpacedClock,
 };
 use mapper_runner::{
-    BatchWatch, Guard, PlanSteps, Protection, ReadingBounds, RigWatch, RunError, Runner, SignalWatch,
-    SilenceWatch, SurgeWatch, UnguardedChannel,
+    AirStillOn, BatchWatch, Guard, PlanSteps, Protection, ReadingBounds, RigWatch, RunError, Runner,
+    SignalWatch, SilenceWatch, SurgeWatch, UnguardedChannel,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -86,6 +86,15 @@ fn run_with_faults(faults: &[(f64, Fault)], set: &GuardSet) -> FaultRun {
 }
 
 fn run_on(rig: &mut dyn Backend, set: &GuardSet) -> (Result<RunEnding, RunError>, Notebook) {
+    let safe = SafeTrajectory { p3_slew_pa_s: Some(50e3), valve_opening_ratio: 1.0, within_s: 20.0 };
+    run_to_safe(rig, set, safe)
+}
+
+fn run_to_safe(
+    rig: &mut dyn Backend,
+    set: &GuardSet,
+    safe: SafeTrajectory,
+) -> (Result<RunEnding, RunError>, Notebook) {
     let plan = plan_of_minutes();
     let mut notebook = Notebook::default();
     let mut guards: Vec<Box<dyn Guard>> =
@@ -99,7 +108,7 @@ fn run_on(rig: &mut dyn Backend, set: &GuardSet) -> (Result<RunEnding, RunError>
     }])));
     guards.extend(set.surge.map(|spec| Box::new(SurgeWatch::new(spec)) as Box<dyn Guard>));
     let protection = Protection {
-        safe: SafeTrajectory { p3_slew_pa_s: Some(50e3), valve_opening_ratio: 1.0, within_s: 20.0 },
+        safe,
         p3_min_pa: 110e3,
         speed: set.speed,
         readings: Some(readings()),
@@ -278,6 +287,29 @@ fn the_safe_state_is_retried_and_then_its_failure_is_reported() {
     assert!(error.to_string().contains("(T2) has given no good reading"), "{error}");
 }
 
+/// The command that shuts the air off is acknowledged and ignored: P3 shows it, and the speed without P3. A P3 that stays while the shaft
+/// coasts does not.
+#[test]
+fn air_that_stays_on_after_an_acknowledged_command_is_reported() {
+    let nan = (FAULT_S, Fault::Nan(Channel::T2));
+    let at_once = SafeTrajectory { p3_slew_pa_s: None, valve_opening_ratio: 1.0, within_s: 20.0 };
+    let end = |faults: &[(f64, Fault)]| {
+        run_to_safe(&mut FaultyBackend::new(lab(), faults.to_vec()), &default_guards(), at_once).0
+    };
+    let seen_by = |faults: &[(f64, Fault)]| match end(faults) {
+        Err(RunError::NotSafe { source: BackendError::Lost { source, .. }, .. }) => {
+            source.downcast_ref::<AirStillOn>().map(|seen| seen.channel)
+        }
+        Err(error) => panic!("{error}"),
+        Ok(_) => None,
+    };
+    let deaf = (0.0, Fault::NotMadeSafe);
+    assert_eq!(seen_by(&[nan.clone(), deaf.clone()]), Some(Channel::P3));
+    let without_p3 = [nan.clone(), deaf, (FAULT_S, Fault::Nan(Channel::P3))];
+    assert_eq!(seen_by(&without_p3), Some(Channel::ShaftSpeed));
+    assert_eq!(seen_by(&[nan, (FAULT_S, Fault::Frozen(Channel::P3))]), None);
+}
+
 /// A clock that advances only during waits and slow disk writes.
 struct WaitClock(std::cell::Cell<f64>);
 
@@ -342,7 +374,8 @@ fn run_on_wall_clock(
 /// the run catches up at each poll. If it takes 3 s, the run is delayed, but the guards still check every sample.
 #[test]
 fn a_slow_disk_does_not_delay_the_first_safe_command() {
-    for (takes_s, late_s) in [(0.8, 1.0), (3.0, 400.0)] {
+    // Five seconds of observation, each written by itself.
+    for (takes_s, late_s) in [(0.8, 4.0), (3.0, 400.0)] {
         let faults = [(FAULT_S, Fault::Reads(Channel::T2, 600.0))];
         let (end, rig, written, wall_s) = run_on_wall_clock(&faults, takes_s);
         let RunEnding::Tripped(trip) = end.unwrap() else { panic!("not seen") };

@@ -143,7 +143,7 @@ pub fn life(scenario: &Scenario, life: &Life, lived: &Lived, live: &Path) -> Res
 
 fn safe(scenario: &Scenario, life: &Life, lived: &Lived, live: &Path) -> Result<(), String> {
     let Lived { stated, ledger, .. } = lived;
-    // A safe command that is acknowledged without effect is not noticed: the safe state was commanded.
+    // A safe command that is acknowledged without effect shows only where P3 was above its lowest value.
     let is_deaf = life.faults.iter().any(|(_, fault)| *fault == Fault::NotMadeSafe);
     if ledger.air_on && !stated.locks_out() && !is_deaf {
         return Err("the air is on, and the run does not say so".to_owned());

@@ -244,7 +244,7 @@ fn recorded(life: &Life, lived: &Lived, part: &Part) -> Result<(), String> {
         Err(error) => return Err(format!("the recording cannot be read: {error}")),
     };
     if !is_garbled(life) {
-        samples(ledger, &report, lived.is_killed)?;
+        samples(life, ledger, &report, lived.is_killed)?;
     }
     let ended: BTreeSet<usize> = lived.ended.iter().map(|marker| marker.index).collect();
     for index in &part.saved {
@@ -277,7 +277,7 @@ fn recorded(life: &Life, lived: &Lived, part: &Part) -> Result<(), String> {
 }
 
 /// Compares the samples that the run received with those in its recording.
-fn samples(ledger: &Ledger, report: &ReadReport, is_killed: bool) -> Result<(), String> {
+fn samples(life: &Life, ledger: &Ledger, report: &ReadReport, is_killed: bool) -> Result<(), String> {
     let received: BTreeMap<i64, &[f64; COMPARED.len()]> =
         ledger.received.iter().map(|(t_s, values)| (ns(*t_s), values)).collect();
     let mut last_ns = i64::MIN;
@@ -310,7 +310,10 @@ fn samples(ledger: &Ledger, report: &ReadReport, is_killed: bool) -> Result<(), 
         ledger.received.iter().map(|(t_s, _)| ns(*t_s)).filter(|t_ns| *t_ns > last_ns).collect();
     let lost_ns: i64 =
         lost.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap_ns| *gap_ns < 1_000_000_000).sum();
-    if is_killed && !ledger.disk_failed && lost_ns > 2_200_000_000 {
+    // Readings that come late come all at once, and the kill may be before they are recorded.
+    let late_s = |fault: &Fault| if let Fault::Late(by_s) = fault { *by_s } else { 0.0 };
+    let late_ns = life.faults.iter().map(|(_, fault)| ns(late_s(fault))).max().unwrap_or_default();
+    if is_killed && !ledger.disk_failed && lost_ns > 2_200_000_000 + late_ns {
         let (lost_s, last_s) = (lost_ns as f64 / 1e9, last_ns.max(0) as f64 / 1e9);
         return Err(format!("a kill lost {lost_s} s of readings, recorded until {last_s} s"));
     }

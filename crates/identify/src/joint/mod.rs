@@ -367,9 +367,10 @@ fn best_housing<'a>(
     if problem.model.parts != Parts::Two {
         return Fitted::of(problem, config);
     }
-    let before = point_values(problem, steps);
+    let (two, before) = (problem.shared, point_values(problem, steps));
     *problem = fit::start::with_parts(problem, Parts::Three);
     minimise(problem, config)?;
+    problem.left_over = std::array::from_fn(|index| LEFT_OVER_CHANGE * (problem.shared[index] - two[index]));
     let after = point_values(problem, steps);
     let mut fitted = Fitted::of(problem, config)?;
     let left =

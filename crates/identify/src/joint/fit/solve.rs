@@ -51,6 +51,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) active: [bool; SHARED],
     /// Spread of a point's efficiency about the surface, one standard deviation; infinite without a surface.
     pub(crate) surface_sigma: f64,
+    /// Error that a housing of three parts leaves in each shared parameter, by its change from two parts; 0 for other housings.
+    pub(crate) left_over: SharedVector,
     /// The expected sum of squares of input noise, which the cost is without.
     pub(crate) input_noise: InputNoise,
     /// Whether no noise is declared, so that a fit is exact.

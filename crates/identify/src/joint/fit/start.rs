@@ -309,6 +309,7 @@ pub(crate) fn problem<'a>(
         .map(|step| member(step, alone.get(step.position), (&scale, mean_eta), &model, config))
         .collect::<Option<Vec<_>>>()?;
     Some(Problem {
+        left_over: [0.0; SHARED],
         model,
         members,
         shared,

@@ -315,7 +315,7 @@ impl BetaTables {
                 *values = (0..rows * columns).filter_map(value).collect();
             }
         }
-        if tables.flow.len() == across {
+        if tables.flow.len() == across && speeds.saturating_mul(across) == rows * columns {
             tables.flow = tables.flow.repeat(speeds);
         }
         let etas = &mut tables.efficiency;

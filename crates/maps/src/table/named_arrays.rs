@@ -5,6 +5,7 @@ use crate::table::beta_tables::{BetaTables, NamedArray};
 use crate::table::quantity::end_in;
 use crate::table::read::read_text;
 use crate::table::read_turbine::read_turbine_text;
+use crate::table::rows_to_lines::MAX_POINTS;
 use mapper_core::{ImportError, ImportedMap, ImportedTurbine, LineEnd, MapDescription};
 use mapper_table::{ColumnName, MatArray, Word, read_mat5};
 use serde_json::Value;
@@ -12,6 +13,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Memory of the arrays of a file, bytes. Bound: twice the largest map file.
 const MAX_MEMORY_BYTES: u64 = 2 * mapper_core::MAP_FILE_SIZE_LIMIT as u64;
+
+/// Maximum number of arrays. Bound: a record of four numbers for each point.
+const MAX_ARRAYS: usize = 4 * MAX_POINTS;
+/// Maximum number of columns. Bound: a map of all channels of a stand.
+const MAX_COLUMNS: usize = 200;
+/// Maximum number of texts that are searched for the reference state. Bound: a heading.
+const MAX_NOTES: usize = 100;
 
 /// The arrays of MATLAB data of level 5 to 7.
 pub fn mat5_arrays(bytes: &[u8]) -> Result<Vec<NamedArray>, ImportError> {
@@ -23,7 +31,7 @@ pub fn mat5_arrays(bytes: &[u8]) -> Result<Vec<NamedArray>, ImportError> {
 
 /// The map of a JSON document that this program did not write: columns, records, lines or tables.
 pub fn read_json_map(document: &Value, description: &MapDescription) -> Result<ImportedMap, ImportError> {
-    let (mut arrays, mut texts) = (Vec::new(), Vec::new());
+    let (mut arrays, mut texts) = (Vec::new(), BTreeMap::new());
     collect("", document, &mut arrays, &mut texts);
     for array in &mut arrays {
         // `"flow": {"unit": "lb/s", "values": [...]}`, or `"units": {"flow": "lb/s"}`. An unknown unit is reported as in a heading.
@@ -34,16 +42,16 @@ pub fn read_json_map(document: &Value, description: &MapDescription) -> Result<I
             false => [format!("{structure}.units.{own}"), format!("units.{own}")],
         };
         let name = if is_wrapped { structure } else { &array.name };
-        let unit =
-            texts.iter().find(|(path, _)| places.iter().any(|place| place.trim_start_matches('.') == path));
-        array.name = unit.map_or_else(|| name.to_owned(), |(_, unit)| format!("{name} [{unit}]"));
+        let unit = places.iter().find_map(|place| texts.get(place.trim_start_matches('.')));
+        array.name = unit.map_or_else(|| name.to_owned(), |unit| format!("{name} [{unit}]"));
     }
-    let notes: Vec<String> = texts.iter().map(|(name, text)| format!("{name}: {text}")).collect();
+    let notes: Vec<String> =
+        texts.iter().take(MAX_NOTES).map(|(name, text)| format!("{name}: {text}")).collect();
     read_named_arrays(&arrays, &notes.join("\n"), description)
 }
 
 /// Adds the arrays of numbers and the texts of a value with their paths.
-fn collect(path: &str, value: &Value, arrays: &mut Vec<NamedArray>, texts: &mut Vec<(String, String)>) {
+fn collect(path: &str, value: &Value, arrays: &mut Vec<NamedArray>, texts: &mut BTreeMap<String, String>) {
     let numbers = |list: &[Value]| {
         let number = |value: &Value| if value.is_null() { Some(f64::NAN) } else { value.as_f64() };
         list.iter().map(number).collect::<Option<Vec<f64>>>().filter(|found| !found.is_empty())
@@ -91,7 +99,9 @@ fn collect(path: &str, value: &Value, arrays: &mut Vec<NamedArray>, texts: &mut 
             let values = vec![number.as_f64().unwrap_or(f64::NAN)];
             arrays.push(NamedArray { name: path.to_owned(), rows: 1, columns: 1, values });
         }
-        Value::String(text) => texts.push((path.to_owned(), text.clone())),
+        Value::String(text) => {
+            texts.insert(path.to_owned(), text.clone());
+        }
         Value::Null | Value::Bool(_) => {}
     }
 }
@@ -134,7 +144,7 @@ fn comments(notes: &str) -> String {
 
 /// The vectors of the points as a table, and the name of their structure if it is a turbine's.
 fn points_text(arrays: &[NamedArray], notes: &str) -> Result<(String, Option<String>), ImportError> {
-    let vectors = whole_vectors(arrays);
+    let vectors = whole_vectors(arrays)?;
     // The points are the most vectors of one length in one structure.
     let mut groups: BTreeMap<(bool, &str, usize), Vec<&Vector>> = BTreeMap::new();
     for vector in vectors.iter().filter(|vector| vector.values.len() > 1 && end_in(&vector.name).is_none()) {
@@ -196,35 +206,40 @@ struct Vector {
 }
 
 /// The vectors; those of the elements of a structure follow each other, a single number stands for every point of its element.
-fn whole_vectors(arrays: &[NamedArray]) -> Vec<Vector> {
-    let arrays = &with_outer_numbers(arrays);
+fn whole_vectors(arrays: &[NamedArray]) -> Result<Vec<Vector>, ImportError> {
+    let arrays = &with_outer_numbers(arrays)?;
     let mut lengths: BTreeMap<&str, usize> = BTreeMap::new();
     for array in arrays {
         let length = lengths.entry(array.element()).or_default();
         *length = array.values.len().max(*length);
     }
-    let mut vectors: Vec<Vector> = Vec::new();
+    let (mut vectors, mut total): (Vec<Vector>, usize) = (Vec::new(), 0);
     for array in arrays {
         let (element, name) = (array.element(), array.own_name().to_owned());
         let structure = if element.is_empty() { array.structure() } else { element };
         let structure = structure.split('(').next().unwrap_or_default().to_owned();
-        let values = match array.values.as_slice() {
-            [value] if !element.is_empty() => vec![*value; lengths.get(element).copied().unwrap_or(1)],
-            values => values.to_vec(),
-        };
+        let is_single = array.values.len() == 1 && !element.is_empty();
+        let count = if is_single { lengths.get(element).copied().unwrap_or(1) } else { array.values.len() };
+        total += count;
+        if total > MAX_COLUMNS * MAX_POINTS {
+            return Err(ImportError::TooMany { line: 1, limit: MAX_POINTS });
+        }
+        let values: Vec<f64> = array.values.iter().copied().cycle().take(count).collect();
+        let is_full = vectors.len() >= MAX_COLUMNS;
         match vectors
             .iter_mut()
             .find(|known| known.name == name && known.structure == structure && !element.is_empty())
         {
             Some(known) => known.values.extend(values),
+            None if is_full => return Err(ImportError::TooMany { line: 1, limit: MAX_COLUMNS }),
             None => vectors.push(Vector { structure, name, values }),
         }
     }
-    vectors
+    Ok(vectors)
 }
 
 /// The arrays; a single number of an element that has elements inside, as the speed of a line with its points, stands in each of them.
-fn with_outer_numbers(arrays: &[NamedArray]) -> Vec<NamedArray> {
+fn with_outer_numbers(arrays: &[NamedArray]) -> Result<Vec<NamedArray>, ImportError> {
     let elements: BTreeSet<&str> = arrays.iter().map(NamedArray::element).collect();
     let mut all = Vec::new();
     for array in arrays {
@@ -235,7 +250,10 @@ fn with_outer_numbers(arrays: &[NamedArray]) -> Vec<NamedArray> {
         all.extend(inner.is_empty().then(|| array.clone()));
         let copy =
             |element: &&str| NamedArray { name: format!("{element}.{}", array.own_name()), ..array.clone() };
-        all.extend(inner.into_iter().map(|element| copy(element)));
+        if all.len() + inner.len() > MAX_ARRAYS {
+            return Err(ImportError::TooMany { line: 1, limit: MAX_ARRAYS });
+        }
+        all.extend(inner.into_iter().map(copy));
     }
-    all
+    Ok(all)
 }

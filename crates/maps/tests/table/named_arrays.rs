@@ -4,6 +4,7 @@
 
 use mapper_core::{DesignPoint, ImportError, ImportedMap, MapDescription, ReferenceState};
 use mapper_maps::table::{NamedArray, read_json_map, read_named_arrays, read_turbine_arrays};
+use proptest::prelude::*;
 use serde_json::json;
 
 fn given() -> MapDescription {
@@ -154,4 +155,53 @@ fn variables_of_matlab_are_a_map() {
     let stored: Vec<f64> = (0..4).flat_map(|column| EXPECTED.map(|row| row[column])).collect();
     let matrix = NamedArray::of_columns("compmap".to_owned(), 4, 4, &stored);
     assert_expected(&read_named_arrays(&[matrix], "", &given()).unwrap(), "matrix");
+}
+
+/// Numbers, texts and lists in each other, under names that headings have.
+fn any_document() -> impl Strategy<Value = serde_json::Value> {
+    let leaf = prop_oneof![
+        (-1e6..1e6f64).prop_map(|number| json!(number)),
+        proptest::collection::vec(0.0..1e5f64, 0..5).prop_map(|list| json!(list)),
+        "[a-z/]{0,6}".prop_map(|text| json!(text)),
+        Just(json!(null)),
+    ];
+    leaf.prop_recursive(4, 40, 6, |inner| {
+        let name = prop_oneof![
+            Just("speed"),
+            Just("flow"),
+            Just("pr"),
+            Just("eta"),
+            Just("units"),
+            Just("pr_surge"),
+            Just("x(1)"),
+            Just("")
+        ];
+        prop_oneof![
+            proptest::collection::vec(inner.clone(), 0..5).prop_map(|list| json!(list)),
+            proptest::collection::btree_map(name.prop_map(str::to_owned), inner, 0..6)
+                .prop_map(|map| json!(map)),
+        ]
+    })
+}
+
+proptest! {
+    #[test]
+    fn no_document_panics(document in any_document()) {
+        let _ = read_json_map(&document, &given());
+    }
+}
+
+/// Many names, many elements, and a speed for each of them in an outer structure end soon.
+#[test]
+fn large_documents_end() {
+    let many: serde_json::Map<String, serde_json::Value> =
+        (0..100_000).map(|at| (format!("flow{at}"), json!([0.1, 0.2]))).collect();
+    let inner: Vec<serde_json::Value> = (0..2000).map(|at| json!({"flow": at})).collect();
+    let outer: serde_json::Map<String, serde_json::Value> = (0..2000)
+        .map(|at| (format!("speed{at}"), json!(at)))
+        .chain([("points".to_owned(), json!(inner))])
+        .collect();
+    for document in [json!(many), json!([outer.clone(), outer])] {
+        assert!(matches!(read_json_map(&document, &given()), Err(ImportError::TooMany { .. })));
+    }
 }

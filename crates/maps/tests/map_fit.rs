@@ -6,6 +6,7 @@ use crate::support::{Row, map_of};
 use mapper_core::{CompressorMap, LeftOutLine};
 use mapper_maps::{MapFit, MapFitError, MapFitOptions, compare, fit_map, leave_out};
 use mapper_physics::compressor_map::closed_form_map::{ClosedFormMap, CompressorCharacteristic};
+use proptest::prelude::*;
 
 /// A map as users have them (tests/data/LICENSE-sample).
 fn sample() -> CompressorMap {
@@ -359,4 +360,69 @@ fn the_slowest_line_is_found_from_the_faster_ones() {
     let lines = leave_out(&MapFit::new(&sample()).unwrap());
     let slowest = lines.first().unwrap();
     assert!(slowest.distance_ratio < 0.02 && slowest.eta.unwrap() < 0.005, "{slowest:?}");
+}
+
+prop_compose! {
+    /// Lines of ellipses with work that falls with flow (Euler) and losses at choke, measured from surge down to a pressure ratio of 1.03 or more.
+    fn any_machine()(
+        (lines, points) in (3usize..8, 5usize..9),
+        (slip, curve, flat, losses) in (0.6..0.8f64, 1.7..3.2f64, 0.3..0.6f64, 0.0..0.15f64),
+        (tip_m_s, lowest) in (350.0..500.0f64, 1.03..1.1f64),
+        scatter in proptest::collection::vec(-1.0..1.0f64, 200),
+        noise in prop_oneof![Just(0.0), Just(0.003)],
+    ) -> Vec<Row> {
+        const CP: f64 = 1005.0;
+        let head_j_kg = |ratio: f64| CP * 298.0 * (ratio.powf(0.4 / 1.4) - 1.0);
+        let mut noise = scatter.into_iter().cycle().map(move |value| noise * value);
+        let mut rows = Vec::new();
+        for line in 0..lines {
+            let tip = tip_m_s * (0.4 + 0.6 * line as f64 / (lines - 1) as f64);
+            let top = 0.78 * slip * tip * tip;
+            let choke_kg_s = 2.2e-4 * tip * (1.0 + tip / 1200.0);
+            let flat_kg_s = choke_kg_s * (flat + (1.0 - flat) * tip / 1400.0);
+            let low = head_j_kg(lowest).min(0.5 * top);
+            for point in 0..points {
+                let head = 0.99 * top + (low - 0.99 * top) * (point as f64 / (points - 1) as f64).powf(1.3);
+                let x = (1.0 - (head / top).powf(curve)).powf(1.0 / curve);
+                let flow = flat_kg_s + (choke_kg_s - flat_kg_s) * x;
+                let work = tip * tip * (slip * (1.0 - 0.15 * flow / choke_kg_s) + 0.05 + losses * (x - 0.8).max(0.0));
+                let ratio = (1.0 + head / CP / 298.0).powf(3.5);
+                let mut scattered = || noise.next().unwrap_or(0.0);
+                rows.push([
+                    tip * 360.0,
+                    flow * (1.0 + scattered()),
+                    1.0 + (ratio - 1.0) * (1.0 + scattered()),
+                    head / work + scattered(),
+                ]);
+            }
+        }
+        rows
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    /// From the flat part to choke nothing turns back, stands still or leaves the range of a compressor without a mark.
+    #[test]
+    fn lines_fall_towards_choke(rows in any_machine()) {
+        let measured = rows.iter().map(|row| row[3]).fold(0.0, f64::max);
+        let options = MapFitOptions { leave_one_out: false, ..MapFitOptions::default() };
+        let fitted = fit_map(map_of(&rows), &options).unwrap().fitted.unwrap();
+        for line in &fitted.lines {
+            let peak = line.nodes.iter().map(|node| node.eta).fold(0.0, f64::max);
+            prop_assert!(peak < measured + 0.1, "{peak} where {measured} was measured: {line:?}");
+            let steep = line.nodes.iter().take_while(|node| node.eta < 0.7 * peak);
+            let steep: Vec<_> = steep.collect();
+            for pair in steep.windows(2) {
+                prop_assert!(pair[1].flow_corrected_kg_s <= pair[0].flow_corrected_kg_s, "{line:?}");
+                prop_assert!(pair[1].pressure_ratio > pair[0].pressure_ratio, "{line:?}");
+                prop_assert!(pair[1].eta > pair[0].eta + 1e-4, "{line:?}");
+            }
+            for node in &line.nodes {
+                prop_assert!(node.extrapolated || node.pressure_ratio > 1.0 && node.eta > 0.0, "{node:?}");
+                prop_assert!(node.eta > 0.0 || node.pressure_ratio <= 1.001, "{node:?}");
+            }
+        }
+    }
 }

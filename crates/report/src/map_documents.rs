@@ -117,6 +117,13 @@ impl Message for ImportRemark {
             ImportRemark::SurgeLine { points } => {
                 format!("The file has a surge line of {points} points; it is that of the map.")
             }
+            ImportRemark::SurgeSpeeds { points, left_out } => {
+                let rest = match left_out {
+                    0 => String::new(),
+                    left_out => format!("; {left_out} of them, which no line is near, are left out"),
+                };
+                format!("The surge line has {points} points without a speed: they have the speeds of the lines that end at their pressure ratios{rest}.")
+            }
             ImportRemark::UnusedBlock { title, rows } => {
                 format!("Not used: `{title}` with {rows} rows, which are not points of speed lines.")
             }

@@ -91,9 +91,18 @@ impl ColumnName {
             matches!(self.tokens.get(..2), Some([Token::Letter('u' | 'd'), Token::Letter('t' | 'p')]));
         is_marked
             || stations('t') > 1
-            || self.has(Word::Other)
+            || self.has(Word::Other) && !self.is_before_cooler()
             || self.has(Word::Bearing) && !self.has(Word::Oil)
             || self.has(Word::Manifold) && !self.has(Word::Exhaust)
+    }
+
+    /// Whether the place is between compressor and charge air cooler.
+    fn is_before_cooler(&self) -> bool {
+        let is_only = |token: &Token| !token.is(Word::Other) || token.is(Word::Cooler);
+        self.has(Word::Cooler)
+            && (self.has(Word::Before) || self.has(Word::In))
+            && !self.has(Word::Oil)
+            && self.tokens.iter().all(is_only)
     }
 
     /// Whether the name is that of a setpoint: `w` after the quantity is the German symbol for it.
@@ -122,7 +131,8 @@ impl ColumnName {
         let mut words = self.tokens.iter().filter_map(|token| token.measured());
         if let Some(first) = words.next() {
             let in_front = self.tokens.first().and_then(|token| token.measured());
-            return if words.all(|other| other == first) { Some(first) } else { in_front };
+            let opening = || self.has(Word::Is(Measured::Opening)).then_some(Measured::Opening);
+            return if words.all(|other| other == first) { Some(first) } else { in_front.or_else(opening) };
         }
         // In `T_C_n_Verd` the quantity comes first, in `Compressor T out` after the machine.
         let in_front = self.tokens.first().and_then(|token| token.letter());
@@ -218,6 +228,9 @@ impl ColumnName {
                 Some(machine) => (machine, Clarity::Clear),
                 None => (Place::Housing, Clarity::Vague),
             });
+        }
+        if self.is_before_cooler() {
+            return Some((Place::Station(2), Clarity::Vague));
         }
         // `EGT 2` is the second probe.
         let is_gas = self.has(Word::Exhaust) || self.has(Word::Charge);

@@ -13,6 +13,7 @@
 
 mod column_name;
 mod instant;
+mod mat5;
 mod name_parts;
 mod number;
 mod text;
@@ -23,6 +24,7 @@ mod xlsx_limits;
 
 pub use column_name::{Clarity, ColumnName, Place, channel_at};
 pub use instant::{DateOrder, Instant, NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant};
+pub use mat5::{MatArray, MatFile, is_mat5, read_mat5};
 pub use name_parts::{Measured, Word};
 pub use number::{
     NO_READING, is_missing, is_missing_mark, number_in, number_with_unit, parse_number, read_number,

@@ -276,7 +276,7 @@ pub fn detect_text(
         }
         Ok(rows)
     };
-    let mut best: Option<(f64, u8, Vec<Vec<String>>)> = None;
+    let mut best: Option<([f64; 2], u8, Vec<Vec<String>>)> = None;
     for separator in given.map_or(SEPARATORS.to_vec(), |separator| vec![separator]) {
         let rows = rows_by(separator)?;
         let score = score(&rows, separator);
@@ -284,7 +284,7 @@ pub fn detect_text(
             best = Some((score, separator, rows));
         }
     }
-    Ok(best.filter(|(score, ..)| *score > 0.0).map(|(_, separator, rows)| (separator, rows)))
+    Ok(best.filter(|(score, ..)| *score > [0.0; 2]).map(|(_, separator, rows)| (separator, rows)))
 }
 
 /// Joins names of several words above columns between blanks: single blanks are within a name, and a unit in brackets belongs to the name
@@ -345,19 +345,22 @@ fn with_closed_brackets(
 /// Candidate separators, in order of preference for equal scores.
 pub const SEPARATORS: [u8; 5] = [b'\t', b';', b',', b'|', b' '];
 
-/// Score of rows as a table: cells with numbers or times in a typical row, times the share of rows of that length.
-fn score(rows: &[Vec<String>], separator: u8) -> f64 {
+/// Score of rows as a table: cells with numbers or times in a typical row, times the share of rows of that length; and the same of the fullest
+/// row, for tables with more rows of headings than of numbers.
+fn score(rows: &[Vec<String>], separator: u8) -> [f64; 2] {
     let length = typical_length(rows);
     if length == 0 || rows.is_empty() {
-        return 0.0;
+        return [0.0; 2];
     }
     let fitting: Vec<&Vec<String>> = rows.iter().filter(|row| row.len() == length).collect();
     let useful = |row: &Vec<String>| row.iter().filter(|cell| is_value(cell, separator)).count() as f64;
     let mut counts: Vec<f64> = fitting.iter().map(|row| useful(row)).collect();
     counts.sort_by(f64::total_cmp);
-    let typical = counts.get(counts.len() / 2).copied().unwrap_or(0.0);
     let share = fitting.len() as f64 / rows.len() as f64;
-    typical * (typical / length as f64) * share * share
+    [counts.get(counts.len() / 2), counts.last()].map(|count| {
+        let count = count.copied().unwrap_or(0.0);
+        count * (count / length as f64) * share * share
+    })
 }
 
 /// The most frequent number of cells in a row.

@@ -29,92 +29,28 @@ pub struct HeaderUnit {
 }
 
 /// Spellings in logs, in addition to those of the table of units; lower case without blanks.
+#[rustfmt::skip]
 const SPELLINGS: &[(Kind, &str, &[&str])] = &[
-    (
-        Kind::Temperature,
-        "degC",
-        &[
-            "degc",
-            "°c",
-            "c",
-            "gradc",
-            "grdc",
-            "grad",
-            "celsius",
-            "gradcelsius",
-            "degreesc",
-            "degreec",
-            "ºc",
-            "deg.c",
-            "*c",
-            "℃",
-            "°с",
-            "graus",
-            "grados",
-            "gradosc",
-        ],
-    ),
+    (Kind::Temperature, "degC", &["degc", "°c", "c", "gradc", "grdc", "grad", "celsius", "gradcelsius", "degreesc", "degreec", "ºc",
+        "deg.c", "*c", "℃", "°с", "graus", "grados", "gradosc"]),
     (Kind::Temperature, "K", &["k", "kelvin", "degk", "°k"]),
     (Kind::Temperature, "degF", &["degf", "°f", "f", "fahrenheit", "deg.f", "℉"]),
     (Kind::Temperature, "degR", &["degr", "°r", "rankine", "deg.r"]),
-    (
-        Kind::Speed,
-        "rpm",
-        &[
-            "rpm",
-            "1/min",
-            "min-1",
-            "min^-1",
-            "min⁻¹",
-            "u/min",
-            "upm",
-            "rev/min",
-            "r/min",
-            "umin",
-            "/min",
-            "1/m",
-            "tr/min",
-            "trmin",
-            "giri/min",
-            "t/min",
-            "r.p.m.",
-            "об/мин",
-            "obr/min",
-            "ot/min",
-            "转/分",
-            "转/分钟",
-        ],
-    ),
-    (
-        Kind::Speed,
-        "krpm",
-        &[
-            "krpm",
-            "1000rpm",
-            "x1000rpm",
-            "×1000rpm",
-            "rpmx1000",
-            "rpm/1000",
-            "10^3rpm",
-            "10³rpm",
-            "1e3rpm",
-            "1000/min",
-            "k1/min",
-            "ku/min",
-            "kupm",
-        ],
-    ),
+    (Kind::Speed, "rpm", &["rpm", "1/min", "min-1", "min^-1", "min⁻¹", "u/min", "upm", "rev/min", "r/min", "umin", "/min", "1/m",
+        "tr/min", "trmin", "giri/min", "t/min", "r.p.m.", "об/мин", "obr/min", "ot/min", "转/分", "转/分钟"]),
+    (Kind::Speed, "krpm", &["krpm", "1000rpm", "x1000rpm", "×1000rpm", "rpmx1000", "rpm/1000", "10^3rpm", "10³rpm", "1e3rpm",
+        "1000/min", "k1/min", "ku/min", "kupm"]),
     (Kind::Speed, "Hz", &["hz", "1/s", "rev/s", "u/s", "rps"]),
     (Kind::Speed, "rad/s", &["rad/s"]),
-    (Kind::MassFlow, "kg/s", &["kg/s", "kg_s", "kgs", "kgs-1", "kg/sec", "кг/с", "千克/秒"]),
-    (Kind::MassFlow, "g/s", &["g/s", "g_s", "gs-1", "g/sec", "г/с"]),
-    (Kind::MassFlow, "kg/h", &["kg/h", "kg_h", "kg/hr", "kghr", "kgh", "kgh-1", "kg/std", "кг/ч"]),
-    (Kind::MassFlow, "kg/min", &["kg/min", "kg_min", "kgmin"]),
-    (Kind::MassFlow, "lb/min", &["lb/min", "lb_min", "lbmin", "lbm/min", "lbs/min", "ppm_lb"]),
-    (Kind::MassFlow, "lb/s", &["lb/s", "lb_s", "lbm/s", "lbs/s", "pps", "lbps"]),
+    (Kind::MassFlow, "kg/s", &["kg/s", "kgs", "kgs-1", "kg/sec", "кг/с", "千克/秒"]),
+    (Kind::MassFlow, "g/s", &["g/s", "gs-1", "g/sec", "г/с"]),
+    (Kind::MassFlow, "kg/h", &["kg/h", "kg/hr", "kghr", "kgh", "kgh-1", "kg/std", "кг/ч"]),
+    (Kind::MassFlow, "kg/min", &["kg/min", "kgmin"]),
+    (Kind::MassFlow, "lb/min", &["lb/min", "lbmin", "lbm/min", "lbs/min", "ppm_lb"]),
+    (Kind::MassFlow, "lb/s", &["lb/s", "lbm/s", "lbs/s", "pps", "lbps"]),
     (Kind::MassFlow, "lb/h", &["lb/h", "lb/hr", "lbm/hr", "lbm/h", "lbs/hr", "lbs/h", "pph"]),
-    (Kind::MassFlow, "mg/s", &["mg/s", "mg_s"]),
-    (Kind::MassFlow, "t/h", &["t/h", "t_h", "t/hr"]),
+    (Kind::MassFlow, "mg/s", &["mg/s"]),
+    (Kind::MassFlow, "t/h", &["t/h", "t/hr"]),
     (Kind::MassFlow, "Nm3/h", &["nm3/h", "nm³/h", "nm^3/h"]),
     (Kind::MassFlow, "Sm3/h", &["sm3/h", "sm³/h", "sm^3/h"]),
     (Kind::Fraction, "%", &["%", "percent", "prozent", "pct"]),
@@ -126,40 +62,14 @@ const SPELLINGS: &[(Kind, &str, &[&str])] = &[
 ];
 
 /// Units of pressure without a reference.
+#[rustfmt::skip]
 const PRESSURES: &[(&str, &str)] = &[
-    ("mbar", "mbar"),
-    ("kpa", "kPa"),
-    ("hpa", "hPa"),
-    ("mpa", "MPa"),
-    ("bar", "bar"),
-    ("atm", "atm"),
-    ("at", "kgf/cm2"),
-    ("psi", "psia"),
-    ("lbf/in2", "psia"),
-    ("lbf/in^2", "psia"),
-    ("kgf/cm2", "kgf/cm2"),
-    ("kgf/cm^2", "kgf/cm2"),
-    ("kgf/cm²", "kgf/cm2"),
-    ("kg/cm2", "kgf/cm2"),
-    ("kg/cm²", "kgf/cm2"),
-    ("mmhg", "mmHg"),
-    ("torr", "Torr"),
-    ("inhg", "inHg"),
-    ("\"hg", "inHg"),
-    ("mmws", "mmH2O"),
-    ("mmwc", "mmH2O"),
-    ("mmh2o", "mmH2O"),
-    ("mmh₂o", "mmH2O"),
-    ("mmce", "mmH2O"),
-    ("inh2o", "inH2O"),
-    ("inh₂o", "inH2O"),
-    ("inwc", "inH2O"),
-    ("\"h2o", "inH2O"),
-    ("pa", "Pa"),
-    ("кпа", "kPa"),
-    ("мпа", "MPa"),
-    ("бар", "bar"),
-    ("па", "Pa"),
+    ("mbar", "mbar"), ("kpa", "kPa"), ("hpa", "hPa"), ("mpa", "MPa"), ("bar", "bar"), ("atm", "atm"), ("at", "kgf/cm2"),
+    ("psi", "psia"), ("lbf/in2", "psia"), ("lbf/in^2", "psia"), ("kgf/cm2", "kgf/cm2"), ("kgf/cm^2", "kgf/cm2"),
+    ("kgf/cm²", "kgf/cm2"), ("kg/cm2", "kgf/cm2"), ("kg/cm²", "kgf/cm2"), ("mmhg", "mmHg"), ("torr", "Torr"), ("inhg", "inHg"),
+    ("\"hg", "inHg"), ("mmws", "mmH2O"), ("mmwc", "mmH2O"), ("mmh2o", "mmH2O"), ("mmh₂o", "mmH2O"), ("mmce", "mmH2O"),
+    ("inh2o", "inH2O"), ("inh₂o", "inH2O"), ("inwc", "inH2O"), ("\"h2o", "inH2O"), ("pa", "Pa"), ("кпа", "kPa"), ("мпа", "MPa"),
+    ("бар", "bar"), ("па", "Pa"),
 ];
 
 /// Units of volume flow, lower case without blanks, and their value in m3/s; `None` for a volume at standard conditions, which the
@@ -203,8 +113,10 @@ pub fn header_unit(text: &str) -> Option<HeaderUnit> {
     }
     let known =
         |kind, symbol, reference| Some(HeaderUnit { kind, unit: by_symbol(kind, symbol)?, reference });
+    // `lbm_min` is `lbm/min` in the name of a variable.
+    let quotient = lower.replacen('_', "/", 1);
     for (kind, symbol, spellings) in SPELLINGS {
-        if spellings.contains(&lower.as_str()) {
+        if spellings.contains(&lower.as_str()) || spellings.contains(&quotient.as_str()) {
             return known(*kind, symbol, Reference::Unstated);
         }
     }

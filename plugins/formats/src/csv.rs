@@ -275,10 +275,10 @@ fn method_of(name: &str) -> Option<Method> {
 /// Name of a column, and its text in a row.
 pub(crate) type Column<Row> = (&'static str, fn(&Row) -> String);
 
-type PointRow<'a> = (&'a SpeedLine, &'a MapPoint);
+pub(crate) type PointRow<'a> = (&'a SpeedLine, &'a MapPoint);
 
 /// The columns, in order. A missing number is an empty field; `eta*` are fractions, 95 % intervals.
-fn columns<'a>() -> [Column<PointRow<'a>>; 28] {
+pub(crate) fn columns<'a>() -> [Column<PointRow<'a>>; 28] {
     [
         ("line_speed_corrected_rpm", |(line, _)| number(line.speed_corrected_rpm)),
         ("speed_corrected_rpm", |(_, point)| number(point.identified.speed_corrected_rpm)),
@@ -319,9 +319,13 @@ fn columns<'a>() -> [Column<PointRow<'a>>; 28] {
     ]
 }
 
-fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
-    let rows = map.lines.iter().flat_map(|line| line.points.iter().map(move |point| (line, point)));
-    write_table(FORMAT.name, header(map), columns(), rows)
+/// The points with their lines.
+pub(crate) fn rows(map: &CompressorMap) -> impl Iterator<Item = PointRow<'_>> {
+    map.lines.iter().flat_map(|line| line.points.iter().map(move |point| (line, point)))
+}
+
+pub(crate) fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
+    write_table(FORMAT.name, header(map), columns(), rows(map))
 }
 
 /// A table of these columns after comment lines.

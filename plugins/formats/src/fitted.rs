@@ -33,8 +33,17 @@ fn columns<'a>() -> [Column<Row<'a>>; 14] {
         }),
         ("eta_common_standard_error", |(.., node)| number(node.eta_common_standard_error)),
         ("line", |(line, ..)| (if line.measured { "measured" } else { "between_or_beyond" }).to_owned()),
-        ("support", |(.., node)| (if node.extrapolated { "extrapolated" } else { "measured" }).to_owned()),
+        ("support", |(.., node)| support(node).to_owned()),
     ]
+}
+
+/// At a pressure ratio below 1 it does not compress.
+fn support(node: &FittedNode) -> &'static str {
+    match (node.pressure_ratio > 1.0 && node.eta > 0.0, node.extrapolated) {
+        (false, _) => "unusable",
+        (true, true) => "extrapolated",
+        (true, false) => "measured",
+    }
 }
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
@@ -51,7 +60,7 @@ fn header(map: &CompressorMap, fitted: &FittedMap) -> String {
          # fitted speed lines; scatter of the points about them: {:.2} % of distance, {:.2} points of efficiency\n\
          # *_standard_error: one standard error; flow and pressure ratio: the parts of the error across the line\n\
          # *_common_standard_error: what all places share (gains, offsets); in eta_standard_error it is included\n\
-         # beta: 0 at the choke end, 1 at the surge end; line: measured or not; support: measured or extrapolated\n",
+         # beta: 0 at the choke end, 1 at the surge end; line: measured or not; support: measured, extrapolated, or unusable where it does not compress\n",
         heading(map, "#"),
         100.0 * fitted.distance_rms_ratio,
         100.0 * fitted.eta_rms,

@@ -1,15 +1,17 @@
-//! JSON: the unchanged map. Keys carry units, efficiencies are fractions, undefined values are null.
+//! JSON: the unchanged map. Keys carry units, efficiencies are fractions, undefined values are null. JSON and TOML of other programs: tables over
+//! speed and an auxiliary coordinate (TASOPT), columns, records or lines.
 
 use mapper_core::{
     CompressorMap, ExportError, ImportError, ImportedMap, MapDescription, MapFormat, ReferenceState,
 };
-use mapper_maps::table::{MAX_POINTS, resolve_reference};
+use mapper_maps::table::{MAX_POINTS, read_json_map, resolve_reference, text_of};
 use serde::Serialize;
 use serde_json::{Value, json};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "json",
     extension: "json",
+    further_extensions: &["toml"],
     description: "the whole map with every point's uncertainty, warnings and window",
     write: Some(write),
     read: Some(read),
@@ -52,9 +54,18 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
 
 fn read(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let mut value: Value = serde_json::from_slice(bytes)?;
+    let mut value: Value = match serde_json::from_slice(bytes) {
+        Ok(value) => value,
+        Err(error) if bytes.trim_ascii_start().starts_with(b"{") => return Err(error.into()),
+        // `[` begins a list in JSON and a table in TOML.
+        Err(_) => toml::from_str(&text_of(bytes)?)
+            .map_err(|error: toml::de::Error| ImportError::Packed { problem: error.to_string() })?,
+    };
     if value.get("kind").and_then(Value::as_str) == Some(crate::turbine::KIND) {
         return Err(ImportError::Turbine { line: 1, text: format!("kind: {}", crate::turbine::KIND) });
+    }
+    if !is_own(&value) {
+        return read_json_map(&value, given);
     }
     let found: Option<ReferenceState> = match value.get("reference") {
         None | Some(Value::Null) => None,
@@ -73,6 +84,15 @@ fn read(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError
     let map: CompressorMap = serde_json::from_value(value)?;
     check(&map)?;
     Ok(map.into())
+}
+
+/// Whether this program wrote the document: its lines have points with the identified ones.
+fn is_own(document: &Value) -> bool {
+    document.get("lines").is_some_and(|lines| {
+        lines
+            .as_array()
+            .is_some_and(|lines| lines.iter().all(|line| line.get("points").is_some_and(Value::is_array)))
+    })
 }
 
 fn number_steps_from_one(map: &mut Value) {

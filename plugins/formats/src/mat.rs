@@ -3,16 +3,22 @@
 //! "MAT-File Format" (MathWorks), chapter 2: each matrix is five 32-bit integers (type, rows, columns, imaginary part, length of the name), the
 //! name with a zero behind it, and the numbers column by column. Level 4 has no structures, and needs no compression or alignment.
 
-use crate::simulation_table::{SimulationTable, digits, heading};
-use mapper_core::{CompressorMap, ExportError, ImportError, ImportedMap, MapDescription, MapFormat};
-use mapper_maps::table::{DEFINITION_PREFIX, read_text};
+use crate::simulation_table::{SimulationTable, heading};
+use mapper_core::{
+    CompressorMap, ExportError, ImportError, ImportedMap, ImportedTurbine, MapDescription, MapFormat,
+    TurbineFormat,
+};
+use mapper_maps::table::{
+    DEFINITION_PREFIX, NamedArray, is_mat5, mat5_arrays, read_named_arrays, read_turbine_arrays,
+};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "mat",
     extension: "mat",
-    description: "MATLAB data (level 4): the tables of the format simscape over corrected speed and beta, and the points",
+    description: "MATLAB data: read to level 7 with structures; written in level 4 with the tables of the format simscape over corrected speed and beta, and the points",
     write: Some(write),
     read: Some(read),
+    turbine: TurbineFormat { write: None, read: Some(read_turbine) },
     ..MapFormat::NONE
 };
 
@@ -57,42 +63,51 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     Ok(file)
 }
 
-fn read(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError> {
+/// The arrays of a file, and notes about the map: name, reference state and definition of the efficiency, as in the comments of text files.
+fn arrays(bytes: &[u8]) -> Result<(Vec<NamedArray>, String), ImportError> {
     let matrices = matrices(bytes);
-    let points = matrices.iter().find(|matrix| matrix.name == POINTS && matrix.rows.len() % 4 == 0);
-    let Some(points) = points else {
+    if matrices.is_empty() && is_mat5(bytes) {
+        return Ok((mat5_arrays(bytes)?, String::new()));
+    }
+    if matrices.is_empty() {
         return Err(ImportError::RowForm {
             line: 1,
             text: String::from_utf8_lossy(bytes.get(..10).unwrap_or(bytes)).into_owned(),
-            form: "a map that this program wrote; in MATLAB save the columns as a table: writetable(struct2table(map), 'map.csv')",
+            form: "MATLAB data of version 4 to 7: save it by `save -v7`",
         });
-    };
-    let count = points.rows.len() / 4;
+    }
     let about = matrices.iter().find(|matrix| matrix.name == ABOUT);
     let about: String = about
         .iter()
-        .flat_map(|matrix| &matrix.rows)
+        .flat_map(|matrix| &matrix.values)
         .filter_map(|code| char::from_u32(*code as u32))
         .collect();
-    // Name, reference state and definition of the efficiency, as in the comments of text files.
     let is_note = |line: &&str| {
         ["compressor map of ", "reference state", DEFINITION_PREFIX].iter().any(|s| line.contains(s))
     };
-    let mut text: String = about.lines().filter(is_note).map(|line| format!("# {line}\n")).collect();
-    text += "speed [rpm];flow [kg/s];PR;efficiency\n";
-    for row in 0..count {
-        let value = |column: usize| points.rows.get(column * count + row).copied().filter(|v| v.is_finite());
-        text += &([0, 1, 2, 3].map(|column| digits(value(column))).join(";") + "\n");
-    }
-    read_text(&text, given)
+    let notes = about.lines().filter(is_note).collect::<Vec<_>>().join("\n");
+    let names = ["speed [rpm]", "flow [kg/s]", "PR", "efficiency"];
+    let points = matrices.iter().find(|matrix| matrix.name == POINTS && matrix.columns == names.len());
+    let Some(points) = points else { return Ok((matrices, notes)) };
+    let column = |(at, name): (usize, &str)| {
+        let values: Vec<f64> = points.values.iter().skip(at).step_by(names.len()).copied().collect();
+        NamedArray { name: name.to_owned(), rows: values.len(), columns: 1, values }
+    };
+    Ok((names.into_iter().enumerate().map(column).collect(), notes))
 }
 
-struct Matrix {
-    name: String,
-    rows: Vec<f64>,
+fn read(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError> {
+    let (arrays, notes) = arrays(bytes)?;
+    read_named_arrays(&arrays, &notes, given)
 }
 
-fn matrices(mut bytes: &[u8]) -> Vec<Matrix> {
+fn read_turbine(bytes: &[u8], given: &MapDescription) -> Result<ImportedTurbine, ImportError> {
+    let (arrays, notes) = arrays(bytes)?;
+    read_turbine_arrays(&arrays, &notes, given)
+}
+
+/// The matrices of level 4; none if the bytes have another form.
+fn matrices(mut bytes: &[u8]) -> Vec<NamedArray> {
     let mut found = Vec::new();
     while let Some((header, rest)) = bytes.split_at_checked(20) {
         let field = |at: usize| {
@@ -104,9 +119,9 @@ fn matrices(mut bytes: &[u8]) -> Vec<Matrix> {
         let Some(length) = length.filter(|_| is_level_4) else { break };
         let Some((name, rest)) = rest.split_at_checked(field(4)) else { break };
         let Some((data, rest)) = rest.split_at_checked(length) else { break };
-        let rows = data.as_chunks().0.iter().map(|number| f64::from_le_bytes(*number)).collect();
+        let values: Vec<f64> = data.as_chunks().0.iter().map(|number| f64::from_le_bytes(*number)).collect();
         let name = String::from_utf8_lossy(name).trim_end_matches('\0').to_owned();
-        found.push(Matrix { name, rows });
+        found.push(NamedArray::of_columns(name, field(1), field(2), &values));
         bytes = rest;
     }
     found

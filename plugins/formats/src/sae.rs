@@ -1,49 +1,70 @@
-//! SAE text, compressor (J1826, J922): `#` comments, then corrected rpm, corrected kg/s, pressure ratio, efficiency in a
-//! row, from choke to surge within a line.
+//! SAE text of a compressor (J1826, J922) in the columns of suppliers: a title, the wheel's diameters, the names of the columns, then rows of
+//! four fields of ten characters (corrected rpm, corrected kg/s, pressure ratio, efficiency) from surge to choke, and the surge line.
 //!
-//! Manufacturers' files may begin with a title, wheel diameters and column names: [`mapper_maps::table`] reads them.
+//! Readers take the fields by column (EngineToolBox, from line 4) or by blanks (OpenWAM): each field begins with a blank and has a decimal
+//! point, without which Fortran would shift the digits. What ten characters cannot hold is in the companion file.
 
-use crate::simulation_table::heading;
-
-use mapper_core::{CompressorMap, ExportError, MapFormat};
-use mapper_maps::table::read_any_bytes;
+use mapper_core::{CompressorMap, ExportError, MapFormat, one_line};
+use mapper_maps::table::{CORRECTED_TO, DEFINITION_PREFIX, UNNAMED_MACHINE, read_any_bytes};
 use std::fmt::Write;
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "sae",
     extension: "txt",
     further_extensions: &["map", "sae", "dat", "cmp", "tsv", "prn"],
-    description: "SAE text: corrected rpm, corrected kg/s, pressure ratio, efficiency, from choke to surge",
+    description: "SAE text: corrected rpm, corrected kg/s, pressure ratio, efficiency in columns of ten; beside it NAME.points.csv with all digits and intervals",
     write: Some(write),
     read: Some(read_any_bytes),
+    companion: Some(("points.csv", crate::csv::write)),
     turbine: crate::turbine::TEXT,
     ..MapFormat::NONE
 };
 
+/// Width of a field. Source: files of suppliers, and the reader of EngineToolBox (`%10s`).
+const WIDTH: usize = 10;
+
+/// A number in a field, with as many digits as fit behind a blank.
+fn field(value: f64) -> String {
+    let exact = value.to_string();
+    let exact = if exact.contains('.') { exact } else { exact + ".0" };
+    let fitting = (exact.len() < WIDTH).then_some(exact);
+    let rounded =
+        || (0..WIDTH).rev().map(|digits| format!("{value:.digits$}")).find(|text| text.len() < WIDTH);
+    let text = fitting.or_else(rounded).unwrap_or_default();
+    format!("{text:>WIDTH$}")
+}
+
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
-    let mut text = heading(map, "#");
     let all = || map.lines.iter().flat_map(|line| &line.points);
     let without = all().filter(|point| point.eta.is_none()).count();
-    // A map without any efficiency has three columns; a heading names them for the reader.
+    // A map without any efficiency has three columns; the heading names them for the reader.
     let has_eta = without < all().count();
+    let machine = if map.machine.is_empty() { UNNAMED_MACHINE.to_owned() } else { one_line(&map.machine) };
+    let mut text =
+        format!("{machine}{CORRECTED_TO}{} K, {} Pa", map.reference.t_ref_k, map.reference.p_ref_pa);
     if without > 0 && has_eta {
-        let _ = writeln!(
-            text,
-            "# {without} points without efficiency are left out: the format has no place for them"
-        );
+        let _ = write!(text, "; {without} points without efficiency left out");
     }
-    let _ = writeln!(text, "# N(rpm) mdot(kg/s) PR{}", if has_eta { " Eff" } else { "" });
+    if let Some(definition) = map.efficiency {
+        let _ = write!(text, "; {DEFINITION_PREFIX}{definition}");
+    }
+    // The diameters of wheel and inlet are not in a map.
+    let _ = writeln!(text, "\n{}{}", field(0.0), field(0.0));
+    let _ = writeln!(text, "   N [rpm]  m [kg/s]        PR{}", if has_eta { "       eff" } else { "" });
     for line in &map.lines {
-        // Points are stored by rising flow; the format goes from choke to surge.
-        for point in line.points.iter().rev() {
-            let eta = match point.eta {
-                None if has_eta => continue,
-                eta => eta.map_or_else(String::new, |eta| format!(" {eta}")),
-            };
-            // Shortest text that reads back to the same number.
-            let (speed_rpm, flow_kg_s) = (line.speed_corrected_rpm, point.flow_corrected_kg_s);
-            let _ = writeln!(text, "{speed_rpm} {flow_kg_s} {}{eta}", point.pressure_ratio);
+        for point in line.points.iter().filter(|point| point.eta.is_some() || !has_eta) {
+            let numbers = [line.speed_corrected_rpm, point.flow_corrected_kg_s, point.pressure_ratio];
+            text.extend(numbers.into_iter().chain(point.eta).map(field));
+            text.push('\n');
         }
+    }
+    if !map.surge.is_empty() {
+        text.push_str("\n\n\nSurge Line\n");
+    }
+    for mark in &map.surge {
+        let numbers = [mark.speed_corrected_rpm, mark.flow_corrected_kg_s, mark.pressure_ratio];
+        text.extend(numbers.map(field));
+        text.push('\n');
     }
     Ok(text.into_bytes())
 }

@@ -3,6 +3,7 @@
 
 mod descriptions;
 mod formats;
+mod public_shapes;
 mod round_trips;
 mod support;
 mod surface;

@@ -1,36 +1,15 @@
-//! MATLAB data of level 5 (`save`, `save -v7`): vectors of numbers, also in structures. Vectors of equal length form a table.
-//!
-//! Format: MathWorks, MAT-File Format (2005-2024), chapter 1. A matrix becomes one column per column of it; texts, cells, objects and complex or
-//! sparse numbers are left out.
+//! MATLAB data of level 5 (`save`, `save -v7`): vectors of numbers, also in structures. Vectors of equal length form a table. A matrix becomes
+//! one column per column of it.
 
 use crate::table_head::MAX_COLUMNS;
 use crate::tables::column_log::{Chunk, ColumnTable, check_columns_file, column_log};
 use mapper_recording::logs::limits::{MAX_UNPACKED_BYTES, max_memory_bytes};
 use mapper_recording::logs::{Log, LogError, LogFile, LogFinding, LogFormat, LogOptions};
-use std::io::Read;
+use mapper_table::{is_mat5, read_mat5};
 
-pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open, write: None };
+pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises: is_mat5, open, write: None };
 
 const NAME: &str = "MATLAB";
-
-/// Size of the header, bytes; its last two give the byte order.
-const HEADER: usize = 128;
-/// Maximum nesting of structures: logs of Simulink have three levels.
-const MAX_DEPTH: usize = 8;
-const MAX_ELEMENTS: usize = 1000;
-/// Types of data elements.
-const MATRIX: u32 = 14;
-const COMPRESSED: u32 = 15;
-/// Classes of arrays.
-const STRUCTURE: u8 = 2;
-const NUMBERS: std::ops::RangeInclusive<u8> = 6..=15;
-/// Flag of a complex array.
-const COMPLEX: u8 = 8;
-
-/// The first words of the header; Octave and SciPy write the same.
-fn recognises(head: &[u8]) -> bool {
-    head.starts_with(b"MATLAB 5.0 MAT-file")
-}
 
 type NamedColumn = (String, Vec<f64>);
 
@@ -38,22 +17,35 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     check_columns_file(file, NAME, options)?;
     let size = file.size_bytes()?;
     let bytes = file.head(usize::try_from(MAX_UNPACKED_BYTES).unwrap_or(usize::MAX))?;
-    let mut reader =
-        Reader { is_big: bytes.get(126) == Some(&b'M'), left: max_memory_bytes(size), ..Reader::default() };
-    reader
-        .elements(bytes.get(HEADER..).unwrap_or_default(), "", 0)
-        .map_err(|why| file.content_error(NAME, format!("it is damaged: {why}; save it again")))?;
+    let damaged = |why| file.content_error(NAME, format!("it is damaged: {why}; save it again"));
+    let content = read_mat5(&bytes, max_memory_bytes(size)).map_err(damaged)?;
+    let mut left_out = content.left_out;
+    let mut columns: Vec<NamedColumn> = Vec::new();
+    for array in content.arrays {
+        let count = if array.rows == 1 || array.columns == 1 { 1 } else { array.columns };
+        if array.values.len() / count.max(1) < 2 {
+            left_out += 1;
+        } else if columns.len() + count > MAX_COLUMNS {
+            return Err(damaged(format!("it has more than {MAX_COLUMNS} columns")));
+        } else if count == 1 {
+            columns.push((array.name, array.values));
+        } else {
+            let named = array.values.chunks(array.rows).enumerate();
+            columns.extend(
+                named.map(|(index, column)| (format!("{}_{}", array.name, index + 1), column.to_vec())),
+            );
+        }
+    }
     let mut tables: Vec<Vec<NamedColumn>> = Vec::new();
-    for column in reader.columns {
+    for column in columns {
         match tables.iter_mut().find(|table| table.iter().any(|(_, first)| first.len() == column.1.len())) {
             Some(table) => table.push(column),
             None => tables.push(vec![column]),
         }
     }
     let mut problems = Vec::new();
-    if reader.left_out > 0 {
-        problems
-            .push(LogFinding::left_out(reader.left_out, "texts, cells, objects, complex or single numbers"));
+    if left_out > 0 {
+        problems.push(LogFinding::left_out(left_out, "texts, cells, objects, complex or single numbers"));
     }
     let tables = tables.into_iter().map(|mut table| {
         remove_common_prefix(&mut table);
@@ -70,183 +62,5 @@ fn remove_common_prefix(table: &mut [NamedColumn]) {
     let Some(first) = table.first().and_then(|(name, _)| prefix(name)) else { return };
     if table.iter().all(|(name, _)| prefix(name).as_deref() == Some(&first)) {
         table.iter_mut().for_each(|(name, _)| *name = name.split_off(first.len()));
-    }
-}
-
-#[derive(Default)]
-struct Reader {
-    is_big: bool,
-    left: u64,
-    columns: Vec<NamedColumn>,
-    left_out: usize,
-}
-
-impl Reader {
-    /// Counts memory.
-    fn charge(&mut self, bytes: usize) -> Result<(), String> {
-        let left = self.left.checked_sub(bytes as u64);
-        self.left = left.ok_or("it unpacks to more than a file of its size may; export it in parts")?;
-        Ok(())
-    }
-
-    fn elements(&mut self, mut bytes: &[u8], prefix: &str, depth: usize) -> Result<(), String> {
-        while !bytes.is_empty() {
-            let (kind, data, rest) = self.element(bytes)?;
-            bytes = rest;
-            match kind {
-                COMPRESSED => {
-                    let mut unpacked = Vec::new();
-                    let unpacking =
-                        flate2::read::ZlibDecoder::new(data).take(self.left + 1).read_to_end(&mut unpacked);
-                    unpacking.map_err(|error| error.to_string())?;
-                    self.charge(unpacked.len())?;
-                    if depth >= MAX_DEPTH {
-                        return Err("it is packed several times".to_owned());
-                    }
-                    self.elements(&unpacked, prefix, depth + 1)?;
-                }
-                MATRIX => self.matrix(data, None, prefix, depth)?,
-                _ => self.left_out += 1,
-            }
-        }
-        Ok(())
-    }
-
-    /// Type and data of the first element, and the bytes after it.
-    fn element<'a>(&self, bytes: &'a [u8]) -> Result<(u32, &'a [u8], &'a [u8]), String> {
-        let cut = || "an element is cut short".to_owned();
-        let (kind, size) = (self.word(bytes, 0).ok_or_else(cut)?, self.word(bytes, 4).ok_or_else(cut)?);
-        // The tag itself may contain up to four bytes of data.
-        let (kind, start, size, end): (u32, usize, usize, usize) = match kind >> 16 {
-            0 => {
-                let size = size as usize;
-                let padded = if kind == COMPRESSED { size } else { size.next_multiple_of(8) };
-                (kind, 8, size, 8usize.saturating_add(padded))
-            }
-            small => (kind & 0xffff, 4, small as usize, 8),
-        };
-        let data = bytes.get(start..start.saturating_add(size)).ok_or_else(cut)?;
-        Ok((kind, data, bytes.get(end..).unwrap_or_default()))
-    }
-
-    fn word(&self, bytes: &[u8], at: usize) -> Option<u32> {
-        let word = bytes.get(at..at + 4)?.try_into().ok()?;
-        Some(if self.is_big { u32::from_be_bytes(word) } else { u32::from_le_bytes(word) })
-    }
-
-    /// An array: its numbers become columns, the fields of a structure are read in turn. `field`: its name in a structure.
-    fn matrix(&mut self, data: &[u8], field: Option<&str>, prefix: &str, depth: usize) -> Result<(), String> {
-        if data.is_empty() {
-            return Ok(());
-        }
-        let (_, flags, rest) = self.element(data)?;
-        let flags = self.word(flags, 0).ok_or("an array has no class")?;
-        let (class, is_complex) = (flags.to_le_bytes()[0], flags.to_le_bytes()[1] & COMPLEX != 0);
-        let (_, dimensions, rest) = self.element(rest)?;
-        let dimensions: Vec<usize> = (0..dimensions.len() / 4)
-            .filter_map(|at| Some(self.word(dimensions, 4 * at)? as usize))
-            .collect();
-        let (_, own, rest) = self.element(rest)?;
-        let name = format!(
-            "{prefix}{}",
-            field.map_or_else(|| String::from_utf8_lossy(own), std::borrow::Cow::Borrowed)
-        );
-        match dimensions.as_slice() {
-            [rows, columns] if NUMBERS.contains(&class) && !is_complex => {
-                let (kind, numbers, _) = self.element(rest)?;
-                let values = self.numbers(kind, numbers)?;
-                if rows.checked_mul(*columns) != Some(values.len()) {
-                    return Err(format!(
-                        "`{name}` has {} numbers in {rows} x {columns} places",
-                        values.len()
-                    ));
-                }
-                self.add(&name, values, *rows, *columns)
-            }
-            [rows, columns] if class == STRUCTURE => {
-                let count = rows.saturating_mul(*columns);
-                if depth >= MAX_DEPTH || count > MAX_ELEMENTS {
-                    self.left_out += 1;
-                    return Ok(());
-                }
-                self.structure(rest, &name, count, depth)
-            }
-            _ => {
-                self.left_out += 1;
-                Ok(())
-            }
-        }
-    }
-
-    fn structure(&mut self, data: &[u8], name: &str, count: usize, depth: usize) -> Result<(), String> {
-        let (_, length, rest) = self.element(data)?;
-        let length =
-            self.word(length, 0).filter(|length| *length > 0).ok_or("a structure has no names")? as usize;
-        let (_, names, mut rest) = self.element(rest)?;
-        for element in 1..=count {
-            let prefix = if count == 1 { format!("{name}.") } else { format!("{name}({element}).") };
-            for field in names.chunks(length) {
-                let field =
-                    String::from_utf8_lossy(field.split(|byte| *byte == 0).next().unwrap_or_default())
-                        .into_owned();
-                let (_, data, after) = self.element(rest)?;
-                self.matrix(data, Some(&field), &prefix, depth + 1)?;
-                rest = after;
-            }
-        }
-        Ok(())
-    }
-
-    fn add(&mut self, name: &str, values: Vec<f64>, rows: usize, columns: usize) -> Result<(), String> {
-        let count = if rows == 1 || columns == 1 { 1 } else { columns };
-        if values.len() / count.max(1) < 2 {
-            self.left_out += 1;
-            return Ok(());
-        }
-        if self.columns.len() + count > MAX_COLUMNS {
-            return Err(format!("it has more than {MAX_COLUMNS} columns"));
-        }
-        if count == 1 {
-            self.columns.push((name.to_owned(), values));
-        } else {
-            // Column by column, as MATLAB stores them.
-            let named = values.chunks(rows).enumerate();
-            self.columns
-                .extend(named.map(|(index, column)| (format!("{name}_{}", index + 1), column.to_vec())));
-        }
-        Ok(())
-    }
-
-    #[allow(clippy::unnecessary_cast, reason = "one of the types is f64 already")]
-    fn numbers(&mut self, kind: u32, data: &[u8]) -> Result<Vec<f64>, String> {
-        macro_rules! of {
-            ($number:ty) => {{
-                self.charge(data.len() / size_of::<$number>() * size_of::<f64>())?;
-                data.chunks_exact(size_of::<$number>())
-                    .filter_map(|bytes| {
-                        let bytes = bytes.try_into().ok()?;
-                        let value = if self.is_big {
-                            <$number>::from_be_bytes(bytes)
-                        } else {
-                            <$number>::from_le_bytes(bytes)
-                        };
-                        Some(value as f64)
-                    })
-                    .collect()
-            }};
-        }
-        Ok(match kind {
-            1 => of!(i8),
-            2 => of!(u8),
-            3 => of!(i16),
-            4 => of!(u16),
-            5 => of!(i32),
-            6 => of!(u32),
-            7 => of!(f32),
-            9 => of!(f64),
-            12 => of!(i64),
-            13 => of!(u64),
-            other => return Err(format!("numbers of the unknown type {other}")),
-        })
     }
 }

@@ -106,10 +106,17 @@ pub(crate) fn analyse_head(
         }
         // The group distinguishes columns with the same name.
         let is_repeated = names.iter().filter(|other| **other == name).count() > 1;
-        let above = group_row.or(labels.first().copied().filter(|row| Some(*row) < names_row));
-        let group = above.map_or("", |row| label(rows, row, column, is_repeated));
+        // Merged cells may have two rows: the machine, and the place below it.
+        let above = labels.iter().filter(|row| group_row == Some(**row) || Some(**row) < names_row);
+        let mut from = 0;
+        let mut group: Vec<&str> = Vec::new();
+        for row in above {
+            let (start, text) = label(rows, *row, column, is_repeated, from);
+            group.extend((!text.is_empty() && !group.contains(&text)).then_some(text));
+            from = start;
+        }
         if !group.is_empty() && is_repeated {
-            name = format!("{group} {name}");
+            name = format!("{} {name}", group.join(" "));
         }
         let count = seen.entry(name.clone()).or_default();
         *count += 1;
@@ -120,7 +127,7 @@ pub(crate) fn analyse_head(
         let listed = listed_name(preamble, &header);
         let description: Vec<&str> = labels
             .iter()
-            .map(|row| label(rows, *row, column, is_repeated))
+            .map(|row| label(rows, *row, column, is_repeated, 0).1)
             .chain(listed)
             .filter(|text| !text.is_empty())
             .collect();
@@ -282,15 +289,17 @@ fn unit_in_cells(rows: &[Vec<String>], column: usize, decimal: u8) -> Option<Str
     unit.filter(|_| 2 * with > all).map(str::to_owned)
 }
 
-/// The label of a column in a row. A row of groups, which is sparse or above repeated names, labels only the first column of a group.
-fn label(rows: &[Vec<String>], row: usize, column: usize, is_repeated: bool) -> &str {
-    let Some(cells) = rows.get(row) else { return "" };
+/// The label of a column in a row, and where its group begins, not before `from`. A row of groups, which is sparse or above repeated names,
+/// labels only the first column of a group.
+fn label(rows: &[Vec<String>], row: usize, column: usize, is_repeated: bool, from: usize) -> (usize, &str) {
+    let Some(cells) = rows.get(row) else { return (from, "") };
     let sparse = 2 * cells.iter().filter(|cell| !cell.is_empty()).count() < cells.len();
     let own = cells.get(column).map_or("", String::as_str);
     if !own.is_empty() || !(sparse || is_repeated) {
-        return own;
+        return (if own.is_empty() { from } else { column }, own);
     }
-    cells.get(..column).unwrap_or_default().iter().rfind(|cell| !cell.is_empty()).map_or("", String::as_str)
+    let before = cells.iter().enumerate().take(column).skip(from);
+    before.rev().find(|(_, cell)| !cell.is_empty()).map_or((from, ""), |(at, cell)| (at, cell.as_str()))
 }
 
 /// The first full row with nearly the maximum number of distinct names: later rows have long names, and rows above have merged cells.

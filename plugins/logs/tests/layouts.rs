@@ -394,3 +394,32 @@ fn unknown_units_do_not_hide_the_known_ones() {
     let unit = |name: &str| layout.columns.iter().find(|column| column.name == name).unwrap().unit.clone();
     assert_eq!((unit("P2").as_deref(), unit("T2").as_deref()), (Some("kPa"), Some("degC")));
 }
+
+/// Machine, place and quantity in three rows, with units below or in the names.
+#[test]
+fn headings_of_three_rows_keep_machine_place_and_quantity() {
+    let row = |row: usize| format!("{row},60000,98,{},22,{},150,500", p2_kpa(row), t2_degc(row));
+    let groups = ",,Compressor,,,,Turbine,\n,,Inlet,Outlet,Inlet,Outlet,Inlet,\n";
+    let places = ",,Compressor,,,,Turbine,\n,,Inlet,Outlet,Inlet,Outlet,Inlet,Inlet\n";
+    for head in [
+        format!("{groups}Time,N,p,p,T,T,p,T\ns,rpm,kPa,kPa,degC,degC,kPa,degC\n"),
+        format!("{places}Time [s],N [rpm],p [kPa],p [kPa],T [degC],T [degC],p [kPa],T [degC]\n"),
+    ] {
+        assert_measured(&text(&head, row), "Compressor Outlet p", "Compressor Outlet T", true);
+        let (layout, _) = read(&text(&head, row));
+        let names: Vec<&str> = layout.columns.iter().map(|column| column.name.as_str()).collect();
+        assert!(names.contains(&"Turbine Inlet p") && names.contains(&"Turbine Inlet T"), "{names:?}");
+    }
+}
+
+/// The first keys of imc FAMOS look like text.
+#[test]
+fn famos_is_named() {
+    let file =
+        LogFile::from_bytes(Path::new("log.dat"), b"|CF,2,1,1;|CK,1,3,1,1;\r\n|CD,1,20,0.1,1,1,s,0,0,0;\r\n");
+    let error = LOG_FORMATS.open(&file, &LogOptions::default()).err().unwrap();
+    assert!(
+        matches!(&error, mapper_recording::logs::LogError::Unknown { found, .. } if found.contains("FAMOS")),
+        "{error}"
+    );
+}

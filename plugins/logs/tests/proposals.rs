@@ -3,7 +3,7 @@
 
 use mapper_core::Channel;
 use mapper_log_formats::LOG_FORMATS;
-use mapper_recording::logs::proposal::{Certainty, NominalFlows, Proposal, ProposalRemark, propose};
+use mapper_recording::logs::proposal::{Ambient, Certainty, NominalFlows, Proposal, ProposalRemark, propose};
 use mapper_recording::logs::{LogFile, LogOptions, survey};
 use std::path::Path;
 
@@ -336,4 +336,118 @@ fn a_second_run_in_the_file_is_found_by_the_survey() {
     let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
     let restart = survey(log.as_mut()).unwrap().groups[0].restart.unwrap();
     assert_eq!((restart.row, restart.from_s, restart.to_s), (61, 59.0, 0.0));
+}
+
+/// A whole log whose one channel has this heading. Gauge pressures, if the heading is that of the barometer.
+fn with_heading(channel: Option<Channel>, heading: &str) -> Proposal {
+    let gauge = if channel.is_none() { "(g)" } else { "" };
+    let columns = [
+        (Channel::ShaftSpeed, "Turbo speed [rpm]".to_owned(), 20e3, 118e3),
+        (Channel::CompressorFlow, "Air mass flow [kg/s]".to_owned(), 0.011, 0.152),
+        (Channel::P1, "Compressor inlet pressure [kPa]".to_owned(), 98.6, 96.7),
+        (Channel::T1, "Compressor inlet temperature [degC]".to_owned(), 22.0, 23.0),
+        (Channel::P2, format!("Compressor outlet pressure [kPa{gauge}]"), 103.0, 232.0),
+        (Channel::T2, "Compressor outlet temperature [degC]".to_owned(), 28.0, 134.0),
+        (Channel::P3, "Turbine inlet pressure [kPa]".to_owned(), 102.0, 217.0),
+        (Channel::T3, "Turbine inlet temperature [degC]".to_owned(), 290.0, 525.0),
+        (Channel::P4, "Turbine outlet pressure [kPa]".to_owned(), 98.9, 100.2),
+        (Channel::T4, "Turbine outlet temperature [degC]".to_owned(), 270.0, 447.0),
+        (Channel::TOil, "Oil inlet temperature [degC]".to_owned(), 61.0, 70.0),
+    ];
+    let own = |known: Channel, name: &String| {
+        let (_, unit) = name.rsplit_once('[').unwrap();
+        if Some(known) == channel { format!("{heading} [{unit}") } else { name.clone() }
+    };
+    let mut names: Vec<String> = columns.iter().map(|(known, name, ..)| own(*known, name)).collect();
+    names.extend(channel.is_none().then(|| format!("{heading} [mbar]")));
+    proposal(&names.join(","), |load| {
+        // Steps, with a small movement of their own.
+        let load = (8.0 * load).floor() / 8.0 + 1e-3 * (100.0 * load).sin();
+        let value = |(known, _, low, high): &(Channel, String, f64, f64)| {
+            let gauge_kpa = if channel.is_none() && *known == Channel::P2 { 98.7 } else { 0.0 };
+            low + (high - low) * load - gauge_kpa
+        };
+        columns.iter().map(value).chain(channel.is_none().then_some(987.0 + load)).collect()
+    })
+}
+
+/// Barometers in eleven languages: gauge pressures are over them.
+#[test]
+fn barometers_of_other_languages_are_known() {
+    for heading in [
+        "Omgivningstryck",
+        "Lufttryck",
+        "Omgevingsdruk",
+        "Atmosferische druk",
+        "Барометрическое давление",
+        "Атмосферное давление",
+        "大気圧",
+        "気圧",
+        "大气压力",
+        "Ciśnienie otoczenia",
+        "Ciśnienie atmosferyczne",
+        "Pressione atmosferica",
+        "Pressão atmosférica",
+        "Pression atmosphérique",
+        "Presión barométrica",
+        "Umgebungsdruck",
+        "Atmosférický tlak",
+        "P0",
+        "P_0",
+        "PBAR",
+        "p_amb",
+    ] {
+        let found = with_heading(None, heading);
+        assert!(matches!(found.ambient, Some(Ambient::Column { column: 11, .. })), "{heading}");
+    }
+}
+
+/// Short names and names in other languages; a name with a second meaning is proposed, but not as sure.
+#[test]
+fn names_of_other_programs_and_languages_are_known() {
+    let certain = |channel: Channel, heading: &str| {
+        let found = with_heading(Some(channel), heading);
+        found.entry(channel).map(|entry| entry.certainty)
+    };
+    for (channel, headings) in [
+        (
+            Channel::CompressorFlow,
+            &[
+                "MFAIR",
+                "FM_AIR",
+                "Przepływ masy powietrza",
+                "Strumień masy powietrza",
+                "空気流量",
+                "Luchtdebiet",
+            ][..],
+        ),
+        (Channel::P3, &["涡前压力", "タービン入口圧力", "Ciśnienie przed turbiną"]),
+        (Channel::T3, &["涡前温度", "Temperatur före turbin"]),
+        (Channel::T4, &["涡后温度", "Temperatuur na turbine"]),
+        (Channel::ShaftSpeed, &["過給機回転数", "Обороты ТКР", "Läuferdrehzahl", "Spool Speed", "N_gg"]),
+        (Channel::TOil, &["Olietemperatuur", "Oljetemperatur", "油温"]),
+        (Channel::P1, &["压前压力", "Inlet Pressure P1"]),
+        (Channel::T1, &["Inlet Temperature T1"]),
+        (Channel::P2, &["Compressor Exit Pressure P2"]),
+    ] {
+        for heading in headings {
+            assert_eq!(certain(channel, heading), Some(Certainty::Sure), "{heading}");
+        }
+    }
+    for (channel, headings) in [
+        (Channel::P1, &["P_suc", "入口圧", "Inlaatdruk", "Suction pressure"][..]),
+        (Channel::T1, &["T_suc", "吸入空気温度"]),
+        (Channel::P2, &["P_dis", "過給圧", "Ciśnienie doładowania", "Laddtryck"]),
+        (Channel::T2, &["T_dis", "Charge air temp before intercooler", "Temperatur vor Ladeluftkühler"]),
+        (Channel::P3, &["Exhaust back pressure pre turbo"]),
+        (Channel::T3, &["排气温度", "EGT pre turbo"]),
+    ] {
+        for heading in headings {
+            assert_eq!(certain(channel, heading), Some(Certainty::Likely), "{heading}");
+        }
+    }
+    // Behind the cooler it is another temperature.
+    assert!(
+        with_heading(Some(Channel::T2), "Charge air temp after intercooler").entry(Channel::T2).is_none()
+    );
 }

@@ -1,15 +1,18 @@
 //! Commands on maps, as a user runs them.
 
-use mapper_tests::{CampaignFile, SHORT_GRID, mapper, python, repository, scratch, shared_run};
+use mapper_tests::{
+    CampaignFile, Finished, SHORT_GRID, mapper, mapper_command, python, repository, scratch, shared_run,
+};
 use serde_json::Value;
 use std::ffi::OsStr;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 fn sample() -> PathBuf {
     repository().join("crates/maps/tests/data/sample_compressor.csv")
 }
 
-fn run<const N: usize>(arguments: [&OsStr; N]) -> mapper_tests::Finished {
+fn run<const N: usize>(arguments: [&OsStr; N]) -> Finished {
     mapper([OsStr::new("map")].into_iter().chain(arguments))
 }
 
@@ -36,9 +39,9 @@ fn a_chain_of_conversions_returns_the_original_numbers() {
     convert(&sample(), &file("a.json"), "SAE");
     let to_garrett = ["--to-reference".as_ref(), OsStr::new("Garrett")];
     let [option, garrett] = to_garrett;
-    run(["convert".as_ref(), file("a.json").as_os_str(), file("b.txt").as_os_str(), option, garrett])
+    run(["convert".as_ref(), file("a.json").as_os_str(), file("b.xlsx").as_os_str(), option, garrett])
         .exits(0);
-    run(["convert".as_ref(), file("b.txt").as_os_str(), file("c.csv").as_os_str(), option, "SAE".as_ref()])
+    run(["convert".as_ref(), file("b.xlsx").as_os_str(), file("c.csv").as_os_str(), option, "SAE".as_ref()])
         .exits(0);
     run(["convert".as_ref(), file("c.csv").as_os_str(), file("d.json").as_os_str()]).exits(0);
     let read = |name: &str| -> Value { serde_json::from_slice(&std::fs::read(file(name)).unwrap()).unwrap() };
@@ -229,5 +232,128 @@ fn a_directory_of_speed_lines_is_one_map() {
         let columns = found["columns"].as_array().unwrap();
         let flow = columns.iter().find(|column| column["key"] == "flow").unwrap();
         assert!((flow["low"].as_f64().unwrap() - 0.045_359_237).abs() < 1e-9, "{flow}");
+    }
+}
+
+/// What is written is read by the rules of two public readers and by openpyxl, and a structure of MATLAB is the map of its columns.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn other_programs_read_the_maps_and_theirs_are_read() {
+    let scratch = scratch();
+    let file = |name: &str| scratch.path().join(name);
+    let text = "Stage 7, test of May\n\nN [rpm];m [kg/s];PR;eta\n60000.5;0.04999;1.4;0.681234567\n60000.5;0.06;1.38;0.72\n\
+                60000.5;0.07;1.3;\n90000;0.07;1.9;0.7\n90000;0.09;1.7;0.68\nSurge line;;;\n60000.5;0.045;1.41;\n90000;0.06;1.92;\n";
+    std::fs::write(file("map.csv"), text).unwrap();
+    for name in ["a.sae", "a.xlsx"] {
+        let format = if name == "a.sae" { "sae" } else { "xlsx" };
+        let (from, to) = (file("map.csv"), file(name));
+        let arguments = ["convert".as_ref(), from.as_os_str(), to.as_os_str(), "--reference".as_ref()];
+        let [a, b, c, d] = arguments;
+        run([a, b, c, d, "SAE".as_ref(), "--to".as_ref(), format.as_ref()]).exits(0);
+    }
+    let seen = python("map_files.py", ["a.sae", "a.xlsx", "structure.mat"].map(&file));
+    let rows = |value: &Value| -> Vec<Vec<Option<f64>>> {
+        let row = |row: &Value| row.as_array().unwrap().iter().map(Value::as_f64).collect();
+        value.as_array().unwrap().iter().map(row).collect()
+    };
+    let expected = |row: &[f64; 4]| row.map(Some).to_vec();
+    let points = [
+        [60000.5, 0.04999, 1.4, 0.681_234_6],
+        [60000.5, 0.06, 1.38, 0.72],
+        [90e3, 0.07, 1.9, 0.7],
+        [90e3, 0.09, 1.7, 0.68],
+    ];
+    let points: Vec<Vec<Option<f64>>> = points.iter().map(expected).collect();
+    assert_eq!(rows(&seen["engine_tool_box"]["points"]), points);
+    let surge = rows(&seen["engine_tool_box"]["surge"]);
+    let surge: Vec<&[Option<f64>]> = surge.iter().map(|row| &row[..3]).collect();
+    let marks = [[60000.5, 0.045, 1.41], [90e3, 0.06, 1.92]].map(|mark| mark.map(Some));
+    assert_eq!(surge, marks.each_ref().map(|mark| &mark[..]));
+    let by_line: Vec<Vec<Vec<Option<f64>>>> = seen["open_wam"].as_array().unwrap().iter().map(rows).collect();
+    assert_eq!(by_line, [points[..2].to_vec(), points[2..].to_vec()]);
+    // The point without an efficiency, and every digit, are in the companion and in the workbook.
+    let companion = std::fs::read_to_string(file("a.points.csv")).unwrap();
+    assert!(companion.contains("0.681234567") && companion.contains(",0.07,1.3,,"), "{companion}");
+    let sheets = seen["workbook"].as_object().unwrap();
+    assert!(["Map", "Points", "Conditions", "Surge line"].iter().all(|name| sheets.contains_key(*name)));
+    let map = rows(&sheets["Map"]);
+    let numbers: Vec<_> = map.iter().filter(|row| row[0].is_some()).cloned().collect();
+    assert_eq!((numbers.len(), numbers[0][3], numbers[2][3]), (5, Some(0.681_234_567), None));
+    // The title survives both.
+    for name in ["a.sae", "a.xlsx"] {
+        let back = file(&format!("{name}.json"));
+        run(["convert".as_ref(), file(name).as_os_str(), back.as_os_str()]).exits(0);
+        let back: Value = serde_json::from_slice(&std::fs::read(back).unwrap()).unwrap();
+        assert_eq!(back["machine"], "Stage 7, test of May", "{name}");
+        assert_eq!(back["surge"].as_array().unwrap().len(), 2, "{name}");
+    }
+    let mat = file("structure.mat");
+    let inspected =
+        run(["inspect".as_ref(), mat.as_os_str(), "--reference".as_ref(), "SAE".as_ref(), "--json".as_ref()]);
+    let inspected: Value = serde_json::from_str(&inspected.exits(0).stdout).unwrap();
+    let of_lines: Vec<(f64, u64)> = lines(&inspected)
+        .iter()
+        .map(|line| (line["speed_corrected_rpm"].as_f64().unwrap(), line["points"].as_u64().unwrap()))
+        .collect();
+    assert_eq!(of_lines, [(60e3, 3), (90e3, 3)]);
+    let flow = inspected["columns"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|column| column["key"] == "flow")
+        .unwrap()
+        .clone();
+    assert_eq!((flow["low"].as_f64(), flow["high"].as_f64()), (Some(0.05), Some(0.09)));
+}
+
+/// Line ends, a byte order mark, another encoding, compression and standard input change nothing, for maps, steady points and logs.
+#[test]
+fn content_is_the_same_however_it_is_packed() {
+    let scratch = scratch();
+    let log: String =
+        (0..200).map(|row| format!("{row},{},{}\n", 100.0 + f64::from(row / 20), 20 + row / 10)).collect();
+    for (name, command, content) in [
+        ("map.csv", "map", "Speed,Flow,PR,Efficiency\nrpm,lb/s,T-T,%\n45000,0.1,1.26,69\n45000,0.15,1.24,75\n75000,0.2,1.74,69\n".to_owned()),
+        ("points.csv", "map", "N [rpm];m [g/s];P1 [kPa];T1 [°C];P2 [kPa];T2 [°C]\n50000;60;97,5;21,4;129,7;57,1\n80000;96;97;21,7;179;102\n".to_owned()),
+        ("log.csv", "log", format!("Time [s],Compressor outlet pressure [kPa],Compressor outlet temperature [degC]\n{log}")),
+    ] {
+        let inspect = |input: Option<&Path>, path: &Path| {
+            let reference: &[&str] = if command == "map" { &["--reference", "SAE"] } else { &[] };
+            let mut arguments = vec![command.as_ref(), "inspect".as_ref(), path.as_os_str(), "--json".as_ref()];
+            arguments.extend(reference.iter().map(OsStr::new));
+            let mut command = mapper_command(arguments);
+            if let Some(input) = input {
+                command.stdin(std::fs::File::open(input).unwrap());
+            }
+            let finished: Finished = command.output().unwrap().into();
+            let mut found = finished.exits(0).json();
+            for key in ["map", "log", "file", "path", "channel_map"] {
+                found.as_object_mut().unwrap().remove(key);
+            }
+            found
+        };
+        let write = |name: &str, bytes: &[u8]| {
+            let path = scratch.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            path
+        };
+        let plain = write(name, content.as_bytes());
+        let expected = inspect(None, &plain);
+        let windows = content.replace('\n', "\r\n");
+        let wide: Vec<u8> = format!("\u{feff}{windows}").encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        packer.write_all(content.as_bytes()).unwrap();
+        let packed = write(&format!("{name}.gz"), &packer.finish().unwrap());
+        for path in [
+            write(&format!("windows_{name}"), windows.as_bytes()),
+            write(&format!("mark_{name}"), format!("\u{feff}{content}").as_bytes()),
+            packed.clone(),
+        ] {
+            assert_eq!(inspect(None, &path), expected, "{}", path.display());
+        }
+        assert_eq!(inspect(Some(&plain), Path::new("-")), expected, "{name}");
+        assert_eq!(inspect(Some(&packed), Path::new("-")), expected, "{name}");
+        let wide = inspect(None, &write(&format!("wide_{name}"), &wide));
+        assert_eq!(wide["columns"], expected["columns"], "{name}");
     }
 }

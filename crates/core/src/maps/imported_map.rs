@@ -143,6 +143,8 @@ pub enum ImportRemark {
     ExtrapolatedNodes { count: usize },
     /// The file has a surge line of so many points.
     SurgeLine { points: usize },
+    /// So many points of the surge line have no speeds: those of the lines that end at their pressure ratios were taken, but for some.
+    SurgeSpeeds { points: usize, left_out: usize },
     /// The rows below a title, or a sheet, are not used.
     UnusedBlock { title: String, rows: usize },
     /// Rows at standstill were left out.

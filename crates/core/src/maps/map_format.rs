@@ -78,6 +78,8 @@ pub struct MapFormat {
     pub write: Option<WriteMap>,
     /// Writer in display units, if the format is a picture.
     pub draw: Option<DrawMap>,
+    /// Extension and writer of a second file with what the format has no place for.
+    pub companion: Option<(&'static str, WriteMap)>,
     /// Reader, if the format can be read.
     pub read: Option<ReadMap>,
     /// Writer and reader of turbine maps.
@@ -93,6 +95,7 @@ impl MapFormat {
         description: "",
         write: None,
         draw: None,
+        companion: None,
         read: None,
         turbine: TurbineFormat::NONE,
     };

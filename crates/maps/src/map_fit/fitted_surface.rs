@@ -360,6 +360,7 @@ fn line_nodes(fit: &MapFit, ends: &LineEndAngles, speed_corrected_rpm: f64, coun
     let total = length[WALK_STEPS];
     let errors = LineErrors::new(&fit.solution, speed_ratio);
     let supported = ends.supported(speed_ratio);
+    let mut largest_kg_s = f64::INFINITY;
     (0..count)
         .map(|i| {
             let wanted = total * i as f64 / (count - 1) as f64;
@@ -369,14 +370,18 @@ fn line_nodes(fit: &MapFit, ends: &LineEndAngles, speed_corrected_rpm: f64, coun
             let angle = walk[after - 1] + share * (walk[after] - walk[after - 1]);
             let place = shape.physical(angle, speed_ratio);
             let error = errors.at(angle, scales);
-            let extrapolated = supported.is_none_or(|(low, high)| {
+            let is_beyond = supported.is_none_or(|(low, high)| {
                 angle < low - ANGLE_TOLERANCE_RAD || angle > high + ANGLE_TOLERANCE_RAD
             });
-            let eta = fit.limit_efficiency(place.eta, extrapolated);
+            let eta = fit.limit_efficiency(place.eta, is_beyond);
+            // There it does not compress, whatever was measured.
+            let extrapolated = is_beyond || place.pressure_ratio <= 1.0 || eta <= 0.0;
             let common = fit.data.common.at(speed_ratio, place.flow_kg_s / scales.flow_kg_s);
             let work = shape.at(angle).work * speed_ratio * speed_ratio;
+            // On the vertical part the correction of the radius may turn back by a permille.
+            largest_kg_s = place.flow_kg_s.min(largest_kg_s);
             FittedNode {
-                flow_corrected_kg_s: place.flow_kg_s,
+                flow_corrected_kg_s: largest_kg_s,
                 pressure_ratio: place.pressure_ratio,
                 eta,
                 work_ratio: if eta < place.eta { work * place.eta / eta } else { work },

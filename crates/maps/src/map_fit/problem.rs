@@ -44,8 +44,8 @@ const START_EXPONENT: f64 = -0.05;
 const START_PENALTY: f64 = 0.03;
 /// Minimum flow, head or work of which a logarithm is taken. Bound: excludes the logarithm of zero.
 const SMALL: f64 = 1e-9;
-/// Minimum efficiency of a point for the start values. Bound: excludes division by zero.
-const MIN_ETA: f64 = 0.05;
+/// Minimum efficiency of a point for the start values. Bound: near choke, work is the ratio of two small numbers.
+const MIN_ETA: f64 = 0.2;
 /// Ridge of the start values. Bound: keeps matrices regular, far below any weight.
 const RIDGE: f64 = 1e-6;
 /// Step of the derivatives by a parameter. Bound: between rounding and curvature for parameters of order 1.
@@ -121,7 +121,7 @@ impl<'a> Problem<'a> {
             .points
             .iter()
             .filter_map(|p| {
-                let work = (p.head() / p.eta?.max(MIN_ETA)).max(SMALL).ln();
+                let work = (p.head() / p.eta.filter(|eta| *eta >= MIN_ETA)?).max(SMALL).ln();
                 Some(((p.flow() - self.frame.middle_kg_s) / self.frame.half_range_kg_s, work))
             })
             .collect();

@@ -1,18 +1,72 @@
 //! Reads tables over speed and an auxiliary coordinate (beta, R line) from the scripts and files of simulation programs: arrays of MATLAB and
 //! Python, nested tables of NPSS.
 
+use crate::table::column::{Machine, column};
 use crate::table::design_point::{MapDesign, design_of, flow_unit, interpolate, scale_to_design};
-use crate::table::quantity::{efficiency_in_comment, reference_in_comment};
+use crate::table::quantity::{Quantity, efficiency_in_comment, end_in, reference_in_comment};
 use crate::table::rows_to_lines::{Row, check_point_count, map_of_rows};
+use crate::table::sheet::points::MIN_PERCENTAGE;
+use mapper_core::unit_factors::PERCENT;
 use mapper_core::{CompressorMap, ImportError, ImportRemark, ImportedMap, MapDescription};
+use mapper_numerics::statistics::median;
 
 #[derive(Debug, Default)]
-struct BetaTables {
+pub(crate) struct BetaTables {
     speeds: Vec<f64>,
     beta: Vec<f64>,
     flow: Vec<f64>,
     pressure_ratio: Vec<f64>,
     efficiency: Vec<f64>,
+}
+
+/// An array with its name, which is a path in structures: `map.flow`, `lines(2).flow`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct NamedArray {
+    /// Name.
+    pub name: String,
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub columns: usize,
+    /// The numbers row by row.
+    pub values: Vec<f64>,
+}
+
+impl NamedArray {
+    /// An array whose numbers are stored column by column.
+    pub fn of_columns(name: String, rows: usize, columns: usize, stored: &[f64]) -> NamedArray {
+        let place = |at: usize| (at % columns.max(1)) * rows + at / columns.max(1);
+        let values = (0..stored.len()).filter_map(|at| stored.get(place(at)).copied()).collect();
+        NamedArray { name, rows, columns, values }
+    }
+
+    pub(crate) fn is_matrix(&self) -> bool {
+        self.rows > 1 && self.columns > 1
+    }
+
+    /// The structure around the array, and its own name; the unit behind the name may have a point.
+    fn parts(&self) -> (&str, &str) {
+        let end = self.name.find('[').unwrap_or(self.name.len());
+        self.name[..end]
+            .rfind('.')
+            .map_or(("", self.name.as_str()), |at| (&self.name[..at], &self.name[at + 1..]))
+    }
+
+    /// The last part of the name.
+    pub(crate) fn own_name(&self) -> &str {
+        self.parts().1
+    }
+
+    /// The structure around the array.
+    pub(crate) fn structure(&self) -> &str {
+        self.parts().0
+    }
+
+    /// The number of the structure's element, and what is around it; empty if the array is not in a list of structures.
+    pub(crate) fn element(&self) -> &str {
+        let (structure, _) = self.parts();
+        if structure.ends_with(')') { structure } else { "" }
+    }
 }
 
 /// Maximum number of numbers of a script. Bound: speed or beta, flow, pressure ratio and efficiency of each point.
@@ -200,11 +254,12 @@ impl BetaTables {
             | "ncmap"
             | "nc"
             | "nc_vec"
+            | "grid_nc"
             | "ncorr"
             | "ncorrmap"
             | "corrected_speed_rpm"
             | "x_c_map_ncvec" => Some(&mut self.speeds),
-            "rlinevec" | "rlinemap" | "rline" | "beta" => Some(&mut self.beta),
+            "rlinevec" | "rlinemap" | "rline" | "grid_rline" | "beta" => Some(&mut self.beta),
             "wcarray"
             | "wcmap"
             | "wc"
@@ -212,13 +267,62 @@ impl BetaTables {
             | "corrected_flow_kg_s"
             | "flow_corrected_kg_s"
             | "mc"
+            | "massflow"
             | "mass_flow" => Some(&mut self.flow),
             "prarray" | "prmap" | "pr" | "pr_map" | "pressure_ratio" => Some(&mut self.pressure_ratio),
-            "effarray" | "effmap" | "eff" | "eff_map" | "isentropic_efficiency" | "efficiency" | "eta" => {
-                Some(&mut self.efficiency)
-            }
+            "effarray"
+            | "effmap"
+            | "eff"
+            | "eff_map"
+            | "isentropic_efficiency"
+            | "isen_efficiency"
+            | "efficiency"
+            | "eta" => Some(&mut self.efficiency),
             _ => None,
         }
+    }
+
+    /// The tables of named arrays: matrices over speed and beta in either order, or vectors over a grid.
+    pub(crate) fn of_arrays(arrays: &[NamedArray]) -> BetaTables {
+        let mut tables = BetaTables::default();
+        let mut wide = Vec::new();
+        for array in arrays.iter().filter(|array| array.values.len() > 1 && end_in(&array.name).is_none()) {
+            let column = column(0, array.own_name(), Machine::Compressor).ok().flatten();
+            let name = match column.as_ref().map(|column| column.quantity) {
+                Some(Quantity::Speed) => "nc",
+                Some(Quantity::Flow) => "wc",
+                Some(Quantity::PressureRatio) => "pr",
+                Some(Quantity::Efficiency) => "eta",
+                _ => array.own_name(),
+            };
+            let Some(place) = tables.array_of(name).filter(|place| place.is_empty()) else { continue };
+            let as_stated = |value: &f64| column.as_ref().map_or(*value, |column| column.as_stated(*value));
+            *place = array.values.iter().map(as_stated).collect();
+            wide.extend(array.is_matrix().then(|| (name.to_owned(), array.rows, array.columns)));
+        }
+        let Some((_, rows, columns)) = wide.first().cloned() else { return tables };
+        // A grid of speeds as large as the tables.
+        if tables.speeds.len() == rows * columns {
+            tables.beta.clear();
+            return tables;
+        }
+        let (speeds, betas) = (tables.speeds.len(), tables.beta.len());
+        let is_across = columns == speeds && (rows != speeds || betas == rows && betas != columns);
+        let across = if is_across { rows } else { columns };
+        for (name, ..) in wide.iter().filter(|_| is_across) {
+            if let Some(values) = tables.array_of(name) {
+                let value = |at: usize| values.get((at % rows) * columns + at / rows).copied();
+                *values = (0..rows * columns).filter_map(value).collect();
+            }
+        }
+        if tables.flow.len() == across && speeds.saturating_mul(across) == rows * columns {
+            tables.flow = tables.flow.repeat(speeds);
+        }
+        let etas = &mut tables.efficiency;
+        if median(&*etas).is_some_and(|eta| eta > MIN_PERCENTAGE) {
+            etas.iter_mut().for_each(|eta| *eta *= 1.0 / PERCENT);
+        }
+        tables
     }
 
     /// Reorders the arrays from beta by beta to speed by speed.
@@ -230,7 +334,12 @@ impl BetaTables {
         }
     }
 
-    fn map(&self, text: &str, code: &str, description: &MapDescription) -> Result<ImportedMap, ImportError> {
+    pub(crate) fn map(
+        &self,
+        text: &str,
+        code: &str,
+        description: &MapDescription,
+    ) -> Result<ImportedMap, ImportError> {
         let mut rows = self.rows()?;
         let mut remarks = Vec::new();
         let unit_kg_s = flow_unit(code, description)?;

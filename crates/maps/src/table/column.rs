@@ -43,6 +43,11 @@ impl Column {
         }
     }
 
+    /// The same quantity in another column.
+    pub(crate) fn at(self, index: usize) -> Column {
+        Column { index, ..self }
+    }
+
     /// A column with the unit of its heading, if there is one.
     pub(crate) fn with_unit(
         index: usize,
@@ -51,7 +56,9 @@ impl Column {
         unit: Option<&str>,
     ) -> Result<Column, ColumnError> {
         let heading: String = heading.chars().take(MAX_HEADING).collect();
-        let Some(text) = unit.filter(|unit| !is_dimensionless(unit)) else {
+        // `lb/s @ 545 R, 13.95 psia` has the reference state behind it.
+        let unit = unit.map(|unit| unit.split('@').next().unwrap_or_default().trim());
+        let Some(text) = unit.filter(|unit| !is_dimensionless(unit) && !is_ratio_kind(unit)) else {
             return Ok(Column { heading, ..Column::bare(index, quantity) });
         };
         let is_measured = matches!(quantity, Quantity::P1 | Quantity::P2 | Quantity::P3 | Quantity::P4);
@@ -96,6 +103,10 @@ impl Column {
 
     pub(crate) fn is_static(&self) -> bool {
         ColumnName::read(&parts(&self.heading).0).has(Word::Static)
+    }
+
+    pub(crate) fn is_command(&self) -> bool {
+        ColumnName::read(&parts(&self.heading).0).is_command()
     }
 
     pub(crate) fn is_corrected(&self) -> bool {
@@ -158,14 +169,25 @@ pub(crate) fn parts(heading: &str) -> (String, Option<String>) {
     if !heading.contains(['[', '(']) && quantity_of_unit(heading).is_some() {
         return (String::new(), Some(heading.to_owned()));
     }
+    // `P1 / kPa(g)`: the bracket belongs to the unit.
+    let known = |unit: &str| {
+        let kind = header_unit(unit).map(|found| found.kind);
+        quantity_of_unit(unit).is_some() || matches!(kind, Some(Kind::Pressure | Kind::Temperature))
+    };
+    let split = split_unit(heading);
+    if let (name, Some(unit)) = &split
+        && unit.ends_with([')', ']'])
+        && known(unit)
+    {
+        return (name.clone(), Some(unit.clone()));
+    }
     if let Some((name, inside)) = last_bracket(heading)
         && !bracket_is_in_name(name, inside)
     {
         return (name.to_owned(), (!is_ratio_kind(inside)).then(|| inside.to_owned()));
     }
     // `MASSc-kg/s`, `Flow kg/s`, `m / kg/h`, `flow_kg_s`.
-    let known = |unit: &str| quantity_of_unit(unit).is_some();
-    if let (name, Some(unit)) = split_unit(heading)
+    if let (name, Some(unit)) = split
         && known(&unit)
         && !is_dimensionless(&unit)
     {
@@ -205,26 +227,16 @@ fn bracket_is_in_name(name: &str, inside: &str) -> bool {
     (root.ends_with("sqrt") || root.ends_with('√')) && inside.len() <= 4
 }
 
+/// Words of brackets that name the kind of a ratio, and no unit: `T-T`, `tot/stat`, `isentropic`.
+const RATIO_KINDS: &str =
+    "ts tt cc ss corr corrected red reduced is isentropic tot total stat static korr t s";
+
 /// Whether a bracket contains words other than a unit, such as total or static.
 fn is_ratio_kind(inside: &str) -> bool {
-    let plain: String = inside.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
-    const KINDS: [&str; 14] = [
-        "ts",
-        "tt",
-        "cc",
-        "ss",
-        "corr",
-        "corrected",
-        "red",
-        "reduced",
-        "is",
-        "isentropic",
-        "total",
-        "korr",
-        "t",
-        "s",
-    ];
-    KINDS.contains(&plain.as_str())
+    let lower = inside.to_lowercase();
+    let mut words = lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).peekable();
+    let is_kind = words.peek().is_some() && words.all(|word| RATIO_KINDS.split(' ').any(|kind| kind == word));
+    is_kind
         || is_dimensionless(inside)
         || ColumnName::read(inside).measured() == Some(Measured::PressureRatio)
 }
@@ -298,14 +310,15 @@ fn unit_of(kind: Kind, text: &str) -> Option<&'static Unit> {
 }
 
 /// The headings with the letter of their machine in the place where names have it, if some have the compressor's (`P1C`, `PC1`, `TC_in`) and
-/// some the turbine's: `P1T` and `PT1`, which are total values elsewhere, become `P_t1`.
-pub(crate) fn with_machine_letters(headings: &[String]) -> Vec<String> {
+/// some the turbine's: `P1T` and `PT1`, which are total values elsewhere, become `P_t1`. `bare_is_compressor`: `P1` is the compressor's.
+pub(crate) fn with_machine_letters(headings: &[String], bare_is_compressor: bool) -> Vec<String> {
     let split = |heading: &String| {
         let (name, unit) = parts(heading);
         let letters: Vec<char> = name.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
         let rest = |at: usize| letters.get(at..).unwrap_or_default().iter().collect::<String>();
         let is_place = |rest: &str| matches!(rest, "1" | "2" | "01" | "02" | "in" | "out");
         let (quantity, (machine, place)) = match letters.as_slice() {
+            [quantity, ..] if bare_is_compressor && is_place(&rest(1)) => (*quantity, ('c', rest(1))),
             [quantity, machine, ..] if is_place(&rest(2)) => (*quantity, (*machine, rest(2))),
             // `PT1C` is total too.
             [quantity, 't', place @ .., machine] | [quantity, place @ .., machine] => {

@@ -287,6 +287,8 @@ pub(crate) struct DescribedColumns {
     statements: Vec<Statement>,
     /// The machine of the map.
     pub(crate) machine: Machine,
+    /// Whether places without the letter of a machine (`P1`) are the compressor's beside those of the turbine (`P1T`).
+    pub(crate) bare_is_compressor: bool,
 }
 
 impl DescribedColumns {
@@ -326,7 +328,7 @@ impl DescribedColumns {
             }
             statements.push(Statement { quantity, place, unit });
         }
-        Ok(DescribedColumns { statements, machine })
+        Ok(DescribedColumns { statements, machine, bare_is_compressor: false })
     }
 
     /// The column of a heading: as described, or as its name suggests.

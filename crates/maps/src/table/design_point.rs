@@ -98,10 +98,10 @@ fn flow_unit_in(code: &str) -> Option<f64> {
 pub(crate) fn design_of(code: &str) -> MapDesign {
     let default = MapDesign::default();
     MapDesign {
-        speed: number(code, &["NcMapDes", "NcDes", "NcMap"])
+        speed: number(code, &["NcMapDes", "NcDes", "des_Nc", "NcMap"])
             .filter(|speed| *speed > 0.0)
             .unwrap_or(default.speed),
-        rline: number(code, &["RlineMapDes", "RlineDes", "RlineMap"]).unwrap_or(default.rline),
+        rline: number(code, &["RlineMapDes", "RlineDes", "des_Rline", "RlineMap"]).unwrap_or(default.rline),
         values: None,
     }
 }

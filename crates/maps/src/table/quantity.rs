@@ -231,6 +231,8 @@ pub(crate) fn quantity_of_name(
         (Measured::Flow, Place::Turbine) => Some(Quantity::TurbineFlow),
         (Measured::Flow | Measured::VolumeFlow, _) => Some(Quantity::Flow),
         (Measured::Pressure, Place::Ambient) => Some(Quantity::Ambient),
+        // A set or computed state is no reading.
+        _ if read.is_command() || read.has(Word::Computed) => None,
         (measured, place) => channel_at(measured, place).and_then(Quantity::of_channel),
     }
 }
@@ -254,6 +256,13 @@ pub(crate) fn end_of_title(text: &str) -> Option<LineEnd> {
     let end = ends.next()?;
     let is_title = text.split_whitespace().count() <= MAX_TITLE_WORDS && ends.all(|other| other == end);
     is_title.then_some(end)
+}
+
+/// Whether a title is that of a line at a distance from an end.
+pub(crate) fn names_margin(text: &str) -> bool {
+    let lower = text.to_lowercase();
+    let words = ["margin", "reserve", "abstand", "marge", "margen", "запас", "裕度", "余量", "control"];
+    lower.contains('%') || words.iter().any(|word| lower.contains(word))
 }
 
 /// Maximum number of words of the title of a block above the table. Bound: `Surge line:`; the title of a map has more.

@@ -2,13 +2,15 @@
 //! first row of its line, one block per speed or side by side, measured points that are not corrected yet.
 
 use crate::table::beta_tables::{read_arrays, read_gsp, read_modelica, read_nested};
-use crate::table::column::{Column, Machine};
+use crate::table::column::{Column, Machine, column};
 use crate::table::description::DescribedColumns;
 use crate::table::design_point::{MapDesign, scale_to_design};
 use crate::table::quantity;
-use crate::table::quantity::{Quantity, efficiency_in_comment};
-use crate::table::rows_to_lines::{Row, map_of_rows, shift_remark, surge_marks};
+use crate::table::quantity::{Quantity, efficiency_in_comment, is_end_title};
+use crate::table::rows_to_lines::{Row, add_surge_speeds, map_of_rows, shift_remark, surge_marks};
+use crate::table::sheet::end_blocks::EndBlocks;
 use crate::table::sheet::grid::{Grid, text_of};
+use crate::table::sheet::headings::without_speed;
 use crate::table::sheet::layout::{self, Layout};
 use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points, points_of_matrices};
 use crate::table::sheet::workbook::grid_of_workbook;
@@ -68,10 +70,25 @@ pub(super) struct Notes {
 }
 
 fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, ImportError> {
-    let described = DescribedColumns::of(description, Machine::Compressor)?;
+    let mut described = DescribedColumns::of(description, Machine::Compressor)?;
+    match read_columns(grid, description, &described) {
+        // Beside `P1T`, which may be a total pressure, `P1` is the compressor's if the turbine's would be no compressor.
+        Err(error @ ImportError::NotACompressor { .. }) => {
+            described.bare_is_compressor = true;
+            read_columns(grid, description, &described).map_err(|_| error)
+        }
+        found => found,
+    }
+}
+
+fn read_columns(
+    grid: &Grid,
+    description: &MapDescription,
+    described: &DescribedColumns,
+) -> Result<ImportedMap, ImportError> {
     let points_grid = points_of_matrices(grid);
     let grid = points_grid.as_ref().unwrap_or(grid);
-    let (grid, layout) = layout::detect_layout(grid, &described)?;
+    let (grid, layout) = layout::detect_layout(grid, described)?;
     let grid = grid.as_ref();
     if layout.is_turbine_alone() {
         let heading = layout.first_row.checked_sub(1).and_then(|row| grid.rows.get(row));
@@ -92,7 +109,8 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
         }
     }
     let reference = reference?;
-    let mut points = points(grid, &described, &layout, &mut remarks)?;
+    let blocks = EndBlocks::of(grid, described, &layout);
+    let mut points = points(grid, described, &layout, &blocks, &mut remarks)?;
     leave_out_standstill(&mut points, |point| speed_of(point, reference), &mut remarks);
     let columns = columns(&layout, &points, Some(reference));
     let in_percent = efficiency_in_percent(&layout, &points);
@@ -121,6 +139,7 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
     }
     check_is_compressor(&measured)?;
     check_unit_of_efficiency(&layout, &rows)?;
+    remarks.extend(add_surge_speeds(&rows, &mut surge));
     // One scale for points and surge line.
     let point_count = rows.len();
     rows.append(&mut surge);
@@ -257,9 +276,11 @@ fn row(
     let any =
         |quantities: &[Quantity]| quantities.iter().find_map(|quantity| point.value(*quantity, reference));
     let flow = any(&[Quantity::Flow, Quantity::VolumeFlow, Quantity::ReducedFlow]);
+    // A surge line may be without speeds.
+    let speed = speed_of(point, reference).or(point.is_of_surge_line.then_some(f64::NAN));
     Ok(Row {
         at: point.at,
-        speed_corrected_rpm: require(point, Quantity::Speed, speed_of(point, reference))?,
+        speed_corrected_rpm: require(point, Quantity::Speed, speed)?,
         flow_corrected_kg_s: require(point, Quantity::Flow, flow)?,
         pressure_ratio: if layout.is_measured() {
             f64::NAN
@@ -374,14 +395,39 @@ pub(super) fn read_notes(grid: &Grid, first_row: usize) -> Notes {
             notes.machine = name.trim().chars().take(200).collect();
         }
     }
+    if notes.machine.is_empty() {
+        notes.machine = title(grid, first_row).unwrap_or_default();
+    }
     notes
 }
+
+/// The title of a text: words alone in its first line.
+fn title(grid: &Grid, first_row: usize) -> Option<String> {
+    let row = grid.rows.first().filter(|row| first_row > 0 && !row.is_comment)?;
+    let text = row.text();
+    let name = text.split(CORRECTED_TO).next().unwrap_or_default().trim();
+    let is_alone = row.cells.len() == 1 || grid.is_blank_separated;
+    let is_number = |cell: &String| grid.number(cell).is_some();
+    let names_column = |cell: &String| !matches!(column(0, cell, Machine::Compressor), Ok(None));
+    let is_title = is_alone
+        && name.contains(char::is_alphabetic)
+        && !is_end_title(name)
+        && without_speed(grid, name).is_none()
+        && name != UNNAMED_MACHINE
+        && (name.len() < text.len() || !row.cells.iter().any(|cell| is_number(cell) || names_column(cell)));
+    is_title.then(|| name.chars().take(200).collect())
+}
+
+/// What stands between machine and reference state in a title.
+pub const CORRECTED_TO: &str = ", corrected to ";
+/// The name of a machine without one.
+pub const UNNAMED_MACHINE: &str = "unnamed machine";
 
 /// "Reference Pressure 100 kPa, Reference Temperature 298 K": a pressure and a temperature in a line that names their purpose.
 fn parse_reference_line(grid: &Grid, text: &str) -> Option<ReferenceState> {
     let lower = text.to_lowercase();
     let words =
-        ["ref", "corrected to", "conditions", "standard cond", "bezug", "korrigiert auf", "normzustand"];
+        ["ref", "corrected to", "@", "conditions", "standard cond", "bezug", "korrigiert auf", "normzustand"];
     if !words.iter().any(|word| lower.contains(word)) {
         return None;
     }

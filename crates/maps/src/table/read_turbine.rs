@@ -6,6 +6,7 @@ use crate::table::quantity;
 use crate::table::quantity::Quantity;
 use crate::table::read::{check_units_of_flow, leave_out_standstill, pressure_pa, read_notes, require};
 use crate::table::rows_to_lines::{ETA_RANGE, MAX_PRESSURE_RATIO};
+use crate::table::sheet::end_blocks::EndBlocks;
 use crate::table::sheet::grid::Grid;
 use crate::table::sheet::layout;
 use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points};
@@ -47,7 +48,9 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, Im
     if all().any(|column| is_flow(column.quantity) && !column.has_unit()) {
         remarks.push(ImportRemark::FlowUnitAssumed);
     }
-    let mut points = points(grid, &described, &layout, &mut remarks)?;
+    let blocks = EndBlocks::of(grid, &described, &layout);
+    let mut points = points(grid, &described, &layout, &blocks, &mut remarks)?;
+    points.retain(|point| !point.is_of_surge_line);
     leave_out_standstill(&mut points, speed_of, &mut remarks);
     let measured = match layout.is_measured() {
         true => {

@@ -177,6 +177,42 @@ pub fn map_of_rows(
     })
 }
 
+/// Gives the points of a surge line without speeds those of the lines that end at their pressure ratios. Points that no line is near are left out.
+pub(crate) fn add_surge_speeds(rows: &[Row], surge: &mut Vec<Row>) -> Option<ImportRemark> {
+    let points = surge.iter().filter(|row| row.speed_corrected_rpm.is_nan()).count();
+    if points == 0 {
+        return None;
+    }
+    let mut by_speed = rows.to_vec();
+    by_speed.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
+    let lines = by_speed.chunk_by(|a, b| {
+        b.speed_corrected_rpm <= a.speed_corrected_rpm * (1.0 + MAX_LINE_SPEED_DIFFERENCE_RATIO)
+    });
+    let end = |line: &[Row]| {
+        line.iter().min_by(|a, b| a.flow_corrected_kg_s.total_cmp(&b.flow_corrected_kg_s)).copied()
+    };
+    let ends: Vec<Row> = lines.filter_map(end).collect();
+    let speed_rpm = |ratio: f64| {
+        let after = ends.iter().position(|end| end.pressure_ratio >= ratio).unwrap_or(ends.len());
+        let after = after.clamp(1, ends.len().checked_sub(1).filter(|last| *last > 0)?);
+        let (a, b) = (ends.get(after - 1)?, ends.get(after)?);
+        let share = (ratio - a.pressure_ratio) / (b.pressure_ratio - a.pressure_ratio);
+        let near = -MAX_BEYOND..=1.0 + MAX_BEYOND;
+        near.contains(&share)
+            .then_some(a.speed_corrected_rpm + share * (b.speed_corrected_rpm - a.speed_corrected_rpm))
+    };
+    let rises = ends.windows(2).all(|pair| pair[1].pressure_ratio > pair[0].pressure_ratio);
+    for row in surge.iter_mut().filter(|row| row.speed_corrected_rpm.is_nan()) {
+        row.speed_corrected_rpm = speed_rpm(row.pressure_ratio).filter(|_| rises).unwrap_or(f64::NAN);
+    }
+    let before = surge.len();
+    surge.retain(|row| row.speed_corrected_rpm.is_finite());
+    Some(ImportRemark::SurgeSpeeds { points, left_out: before - surge.len() })
+}
+
+/// Distance of a point of the surge line beyond the outermost line, over the distance of the next two. Bound: further out is another map.
+const MAX_BEYOND: f64 = 0.5;
+
 /// The surge line of a file, without standard errors.
 pub(crate) fn surge_marks(map: &CompressorMap, rows: &[Row]) -> Vec<SurgeMark> {
     let mark = |row: &Row| {

@@ -41,6 +41,9 @@ fn a_block_below_its_title_is_the_surge_line() {
             ";",
             "Ligne de pompage;;;\nN [rpm];m [kg/s];PR;\n60000;0.045;1.42;\n90000;0.055;1.95;\n",
         ),
+        // In another order and other units.
+        ("N [rpm],m [kg/s],PR,eta\n", ",", "Surge line,,,\nPR,m [g/s],N [krpm]\n1.42,45,60\n1.95,55,90\n"),
+        ("N [rpm],m [kg/s],PR,eta\n", ",", "Surge,,,\nN,m,PR\nkrpm,g/s,-\n60,45,1.42\n90,55,1.95\n"),
         (
             "Surge line\nN [rpm],m [kg/s],PR\n60000,0.045,1.42\n90000,0.055,1.95\nSpeed lines\nN [rpm],m [kg/s],PR,eta\n",
             ",",
@@ -66,17 +69,37 @@ fn a_block_below_its_title_is_the_surge_line() {
     }
 }
 
+/// Its points have the speeds of the lines that end at their pressure ratios: 1.4 at 60 krpm and 1.9 at 90 krpm.
+#[test]
+fn a_surge_line_without_speeds_gets_those_of_the_lines() {
+    for (above, separator, below) in [
+        ("N [rpm],m [kg/s],PR,eta\n", ",", "Surge line,,,\nm [kg/s],PR\n0.045,1.45\n0.055,1.90\n0.1,2.6\n"),
+        ("N [rpm];m [kg/s];PR;eta\n", ";", "Pumpgrenze;;;\n;0.045;1.45;\n;0.055;1.90;\n;0.1;2.6;\n"),
+        ("DEMO\n", " ", "Surge Line\n0.045 1.45\n0.055 1.90\n0.1 2.6\n"),
+    ] {
+        let text = file(above, separator, below);
+        let found = read_any_text(&text, &given()).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let speeds: Vec<f64> = found.map.surge.iter().map(|mark| mark.speed_corrected_rpm).collect();
+        assert!(
+            speeds.len() == 2 && (speeds[0] - 63e3).abs() < 1e-6 && (speeds[1] - 90e3).abs() < 1e-6,
+            "{speeds:?} {text}"
+        );
+        assert!(found.remarks.contains(&ImportRemark::SurgeSpeeds { points: 3, left_out: 1 }), "{text}");
+    }
+}
+
 #[test]
 fn what_cannot_be_the_surge_line_is_named_and_never_merged() {
     let expected: Vec<[Option<f64>; 4]> = FOUR.iter().map(|row| row.map(Some)).collect();
     for (above, separator, below) in [
-        // No speeds, other units, another end, a word in place of the speed.
-        ("N [rpm],m [kg/s],PR,eta\n", ",", "Surge line,,,\nm [kg/s],PR\n0.045,1.42\n0.055,1.95\n"),
+        // Unknown units, another end, a word in place of the speed.
         (
             "N [rpm],m [kg/s],PR,eta\n",
             ",",
-            "Surge line,,,\nN [rpm],m [g/s],PR\n60000,45,1.42\n90000,55,1.95\n",
+            "Surge line,,,\nN [rpm],m [slug/s],PR\n60000,45,1.42\n90000,55,1.95\n",
         ),
+        ("N [rpm],m [kg/s],PR,eta\n", ",", "Surge margin 10 %,,,\n60000,0.05,1.38,\n90000,0.06,1.9,\n"),
+        ("N(rpm) m(kg/s) PR eta\n", " ", "Surge control line\n60000 0.05 1.38\n90000 0.06 1.9\n"),
         ("N(rpm) m(kg/s) PR eta\n", " ", "Choke line\n60000 0.07 1.1\n90000 0.08 1.2\n"),
         ("N [rpm],m [kg/s],PR,eta\n", ",", "Surge,0.045,1.42,\nSurge,0.055,1.95,\n"),
     ] {

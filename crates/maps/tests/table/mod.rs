@@ -2,6 +2,7 @@
 
 mod end_blocks;
 mod matrices;
+mod named_arrays;
 mod units_and_machines;
 mod wide;
 mod workbooks;

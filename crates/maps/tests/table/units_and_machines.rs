@@ -38,6 +38,9 @@ fn a_row_of_units_counts_whatever_its_other_cells_hold() {
         ("# speed flow PR eff\n# rpm lb/s - %\n", "\t", ""),
         ("Units: rpm, lb/s, -, %\nspeed flow PR eff\n", " ", ""),
         ("Customer,A/B\nSpeed [rpm],Flow [lb/s],PR,Eff [%]\n", ",", ""),
+        ("Speed,Flow,PR,Eff\n(rpm),(lb/s),(tot/tot),(%)\n", ",", ""),
+        ("Speed [rpm];Flow [lb/s @ 298 K, 100 kPa];PR (t/s);Eff [%]\n", ";", ""),
+        ("Speed_rpm,Flow_lbm_s,PR_tt,Eff_pct\n", ",", ""),
         ("Speed [rpm],Oil flow [foo],Flow [lb/s],PR,Eff [%],Flow 2 [slug/s]\n", ",", ""),
     ] {
         let mut text = imperial(heading, separator, more);
@@ -52,6 +55,9 @@ fn a_row_of_units_counts_whatever_its_other_cells_hold() {
         assert!((points[0].eta.unwrap() - 0.69).abs() < 1e-9, "{text}");
         assert_eq!((map.lines.len(), points.len()), (2, 4), "{text}");
     }
+    // Words that may be units are named.
+    let found = read("Speed,Flow,PR,Eff\nrot,slug,x,y\n60000,0.05,1.4,0.7\n60000,0.06,1.3,0.68\n").unwrap();
+    assert!(found.remarks.contains(&ImportRemark::UnusedBlock { title: "rot slug x y".to_owned(), rows: 1 }));
     // Without any known unit the file is refused, and kg/s is not assumed.
     for heading in ["Speed,Flow,PR,Eff\nrpm,slug/s,-,%\n", "Speed,Flow,PR,Eff\nrot,slug/s,x,y\n"] {
         assert!(
@@ -91,6 +97,9 @@ fn columns_of_the_turbine_are_never_those_of_the_compressor() {
         (["Pc_in", "Tc_in", "Pc_out", "Tc_out"], ["Pt_in", "Tt_in", "Pt_out", "Tt_out"]),
         (["PT1C", "TT1C", "PT2C", "TT2C"], ["PT1T", "TT1T", "PT2T", "TT2T"]),
         (["P01C", "T01C", "P02C", "T02C"], ["P01T", "T01T", "P02T", "T02T"]),
+        // Alone `P1T` may be a total pressure; beside the compressor's `P1` it is the turbine's.
+        (["P1", "T1", "P2", "T2"], ["P1T", "T1T", "P2T", "T2T"]),
+        (["P1", "T1", "P2", "T2"], ["PT1", "TT1", "PT2", "TT2"]),
     ] {
         let found = read(&turbine_first(compressor, turbine))
             .unwrap_or_else(|error| panic!("{compressor:?} {error}"));
@@ -103,10 +112,78 @@ fn columns_of_the_turbine_are_never_those_of_the_compressor() {
         }
     }
     // Names that do not tell the machines apart.
-    for turbine in [["P1", "T1", "P2", "T2"], ["P1T", "T1T", "P2T", "T2T"]] {
-        let text = turbine_first(["P1", "T1", "P2", "T2"], turbine);
-        assert!(matches!(read(&text), Err(ImportError::NotACompressor { .. })), "{text}");
+    let text = turbine_first(["P1", "T1", "P2", "T2"], ["P1", "T1", "P2", "T2"]);
+    assert!(matches!(read(&text), Err(ImportError::NotACompressor { .. })), "{text}");
+}
+
+/// Machine, place and quantity in three rows of merged cells, as stands export them.
+#[test]
+fn headings_of_three_rows_keep_machine_place_and_quantity() {
+    for head in [
+        ",,Compressor,,,,Turbine,,,\n,,Inlet,,Outlet,,Inlet,,Outlet,\nN,m,p,T,p,T,p,T,p,T\nrpm,kg/s,kPa,K,kPa,K,kPa,K,kPa,K\n",
+        ",,Verdichter,,,,Turbine,,,\n,,Eintritt,,Austritt,,Eintritt,,Austritt,\nN [rpm],m [kg/s],p [kPa],T [K],p [kPa],T [K],p [kPa],T [K],p [kPa],T [K]\n",
+        ",,vor Verdichter,,nach Verdichter,,vor Turbine,,nach Turbine,\nN [rpm],m [kg/s],p [kPa],T [K],p [kPa],T [K],p [kPa],T [K],p [kPa],T [K]\n",
+    ] {
+        let mut text = head.to_owned();
+        for row in POINTS {
+            text += &(row.map(|value| value.to_string()).join(",") + "\n");
+        }
+        let found = read(&text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        for (point, row) in found.measured.iter().zip(POINTS) {
+            let turbine = point.turbine;
+            let readings = [point.p1_pa, point.p2_pa, turbine.p3_pa.unwrap(), turbine.p4_pa.unwrap()];
+            let expected = [row[2], row[4], row[6], row[8]];
+            assert!(readings.iter().zip(expected).all(|(pa, kpa)| (pa / 1e3 - kpa).abs() < 1e-9), "{text}");
+            assert_eq!(
+                [point.t1_k, point.t2_k.unwrap(), turbine.t3_k.unwrap()],
+                [row[3], row[5], row[7]],
+                "{text}"
+            );
+        }
+        assert_eq!(found.measured.len(), 3, "{text}");
     }
+}
+
+/// The unit of a state counts wherever the heading has it.
+#[test]
+fn units_of_states_stand_anywhere_in_the_heading() {
+    for form in ["{} / {}", "{} [{}]", "{}, {}", "{} in {}", "{}_{}", "{} ({})", "{}-{}"] {
+        let heading = |name: &str, unit: &str| form.replacen("{}", name, 1).replacen("{}", unit, 1);
+        let names =
+            [("N", "rpm"), ("m", "g/s"), ("P1", "mbar"), ("T1", "degC"), ("P2", "psia"), ("T2", "degF")];
+        let head: Vec<String> = names.iter().map(|(name, unit)| heading(name, unit)).collect();
+        let text = head.join(";") + "\n50000;60;976;21,45;18,83;134,87\n80000;100;971;21,75;25,96;216,05\n";
+        let found = read(&text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let point = &found.measured[0];
+        // Definitions of the units; NIST SP 811 for psi.
+        let readings = [point.flow_kg_s, point.p1_pa, point.t1_k, point.p2_pa, point.t2_k.unwrap()];
+        let expected = [0.06, 97_600.0, 294.6, 18.83 * 6_894.757, (134.87 + 459.67) / 1.8];
+        for (a, b) in readings.iter().zip(expected) {
+            assert!((a / b - 1.0).abs() < 1e-6, "{readings:?}\n{text}");
+        }
+    }
+    let gauge = "N [rpm];m [kg/s];p_amb / mbar;P1 / mbar(g);T1 / K;P2 / kPa(g)\n50000;0,06;990;-14;294,6;30\n80000;0,1;990;-19;295;80\n";
+    let point = &read(gauge).unwrap().measured[0];
+    assert!((point.p1_pa - 97_600.0).abs() < 1e-6 && (point.p2_pa - 129_000.0).abs() < 1e-6, "{point:?}");
+}
+
+/// A set or computed value beside the reading is no reading, and a flow that the stand corrected is not corrected again.
+#[test]
+fn set_and_computed_columns_are_no_readings() {
+    let table = |names: &str| {
+        format!(
+            "N [rpm],{names}\n50000,0.06,97.6,294.6,129.8,320,330.3\n80000,0.10,97.1,294.9,179.0,360,375.4\n"
+        )
+    };
+    for state in ["T2 calc [K]", "T2 soll [K]", "T2 ideal [K]"] {
+        let found = read(&table(&format!("m [kg/s],P1 [kPa],T1 [K],P2 [kPa],{state},T2 [K]"))).unwrap();
+        assert_eq!(
+            found.measured.iter().map(|point| point.t2_k).collect::<Vec<_>>(),
+            [Some(330.3), Some(375.4)]
+        );
+    }
+    let corrected = table("m corr [kg/s],P1 [kPa],T1 [K],P2 [kPa],T3 [K],T2 [K]");
+    assert!(matches!(read(&corrected), Err(ImportError::NoColumn { missing: "flow", .. })));
 }
 
 /// T2 from P2/P1 and an efficiency, by gamma of 1.4.

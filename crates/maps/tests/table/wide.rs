@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{MapDescription, ReferenceState};
-use mapper_maps::table::read_any_text;
+use mapper_maps::table::{read_any_text, text_of_lines};
 
 /// Speed, flow, pressure ratio and efficiency of every point.
 pub fn points(text: &str) -> Vec<[Option<f64>; 4]> {
@@ -82,4 +82,29 @@ fn tables_as_they_are_exported() {
     ] {
         assert_eq!(points(text), expected, "{text}");
     }
+}
+
+/// The lines PR = 2 - 5 m and PR = 3 - 5 m cross the contours at m = 0.1 (70 %), which is upright, and PR = 5 m + 1 (75 %), a diagonal.
+#[test]
+fn contours_give_the_efficiencies_where_they_cross_the_lines() {
+    let file = |name: &str, text: &str| (name.to_owned(), text.as_bytes().to_vec());
+    for (heading, eta) in [("", "eta_0.70"), ("flow [kg/s],PR\n", "70%")] {
+        let files = [
+            file("60000", &format!("{heading}0.02,1.9\n0.18,1.1\n")),
+            file("90000", &format!("{heading}0.02,2.9\n0.3,1.5\n")),
+            file(eta, "0.1,1.05\n0.1,2.8\n"),
+            file("eff 75", "0,1\n0.15,1.75\n0.3,2.5\n"),
+        ];
+        let text = text_of_lines(&files).unwrap();
+        let text = text.replace("Q,", "flow [kg/s],");
+        let found: Vec<[Option<f64>; 4]> = points(&text).into_iter().filter(|row| row[3].is_some()).collect();
+        // 2 - 5 m = 5 m + 1 at 0.1, where both contours meet; 3 - 5 m at 0.2.
+        let expected =
+            [[6e4, 0.1, 1.5, 0.7], [6e4, 0.1, 1.5, 0.75], [9e4, 0.1, 2.5, 0.7], [9e4, 0.2, 2.0, 0.75]];
+        assert_eq!(found.len(), 4, "{text}");
+        for (a, b) in found.iter().flatten().zip(expected.iter().flatten()) {
+            assert!((a.unwrap() - b).abs() < 1e-9, "{found:?}");
+        }
+    }
+    assert!(text_of_lines(&[file("notes", "0.1,1.2\n")]).is_err());
 }

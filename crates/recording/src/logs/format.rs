@@ -1,12 +1,12 @@
 //! Interface of log formats: a format recognises a file, or bytes in memory, and opens it as groups, columns and rows.
 
-use crate::logs::limits::max_memory_bytes;
+use crate::logs::limits::{MAX_UNPACKED_BYTES, max_memory_bytes};
 use crate::logs::{LogFinding, LogOptions};
 use serde::Serialize;
 use std::fs::File;
 use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A row of one group.
 #[derive(Debug, Clone, Copy)]
@@ -99,7 +99,8 @@ impl LogFormats {
         let unpacked = file.unpack()?;
         let file = unpacked.as_ref().unwrap_or(file);
         let head = file.head(Self::HEAD_BYTES)?;
-        let found = self.0.iter().find(|format| (format.recognises)(&head));
+        let is_other = head.starts_with(FAMOS);
+        let found = self.0.iter().find(|format| !is_other && (format.recognises)(&head));
         let format = found.ok_or_else(|| LogError::Unknown {
             path: file.path().to_owned(),
             found: describe_unknown(&head),
@@ -130,7 +131,7 @@ impl LogFormats {
 }
 
 /// Common formats that cannot be read, by their first bytes, with a remedy.
-const UNSUPPORTED_FORMATS: [(&[u8], &str); 7] = [
+const UNSUPPORTED_FORMATS: [(&[u8], &str); 8] = [
     (
         b"\x89MCAP",
         "it is an MCAP recording, not a log; identify it directly, with a channel map for its topics and fields if another program wrote it",
@@ -150,9 +151,13 @@ const UNSUPPORTED_FORMATS: [(&[u8], &str); 7] = [
          with `polars.read_ipc(FILE).write_csv(NEW)`",
     ),
     (b"\x89HDF", "it is HDF5; export it as CSV"),
+    (FAMOS, "it is imc FAMOS; save it in FAMOS as MDF 4, MATLAB or text"),
     (b"MATLAB 7.3", "it is MATLAB data of version 7.3; save it by `save -v7`, or export it as CSV"),
     (b"PK", "it is a zip archive but not a complete Excel workbook; unpack it, or save the workbook again"),
 ];
+
+/// The first key of an imc FAMOS file, whose start is text. Source: imc, FAMOS file format.
+const FAMOS: &[u8] = b"|CF,";
 
 fn describe_unknown(head: &[u8]) -> String {
     if head.is_empty() {
@@ -250,7 +255,12 @@ impl<T: Read + Seek> ReadSeek for T {}
 /// The first bytes of a file compressed by gzip.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// A log on disk or in memory, which may be read several times.
+/// The name of standard input. Source: POSIX, utility conventions.
+const STANDARD_INPUT: &str = "-";
+/// What standard input had, which can be read only once.
+static INPUT: OnceLock<Arc<[u8]>> = OnceLock::new();
+
+/// A log on disk, in memory or on standard input, which may be read several times.
 #[derive(Debug, Clone)]
 pub struct LogFile {
     path: PathBuf,
@@ -294,13 +304,37 @@ impl LogFile {
 
     /// The bytes, if they are in memory.
     pub fn bytes(&self) -> Option<&[u8]> {
-        self.bytes.as_deref()
+        self.bytes
+            .as_deref()
+            .or_else(|| INPUT.get().filter(|_| self.is_standard_input()).map(|bytes| &**bytes))
+    }
+
+    fn is_standard_input(&self) -> bool {
+        self.path == Path::new(STANDARD_INPUT)
+    }
+
+    /// The bytes that are in memory, those of standard input too; `None` for a file.
+    fn content(&self) -> Result<Option<Arc<[u8]>>, LogError> {
+        if self.bytes.is_some() || !self.is_standard_input() {
+            return Ok(self.bytes.clone());
+        }
+        if let Some(bytes) = INPUT.get() {
+            return Ok(Some(bytes.clone()));
+        }
+        let mut bytes = Vec::new();
+        let limit = MAX_UNPACKED_BYTES;
+        io::stdin().lock().take(limit + 1).read_to_end(&mut bytes).map_err(|error| self.read_error(error))?;
+        if bytes.len() as u64 > limit {
+            let why = format!("standard input has more than {} MiB; give a file", limit >> 20);
+            return Err(self.read_error(io::Error::new(io::ErrorKind::FileTooLarge, why)));
+        }
+        Ok(Some(INPUT.get_or_init(|| bytes.into()).clone()))
     }
 
     /// The bytes from the start.
     pub fn open(&self) -> Result<Box<dyn ReadSeek>, LogError> {
-        match &self.bytes {
-            Some(bytes) => Ok(Box::new(Cursor::new(bytes.clone()))),
+        match self.content()? {
+            Some(bytes) => Ok(Box::new(Cursor::new(bytes))),
             None => Ok(Box::new(self.open_path()?)),
         }
     }
@@ -312,7 +346,7 @@ impl LogFile {
 
     /// Its size, bytes.
     pub fn size_bytes(&self) -> Result<u64, LogError> {
-        match &self.bytes {
+        match self.content()? {
             Some(bytes) => Ok(bytes.len() as u64),
             None => Ok(std::fs::metadata(&self.path).map_err(|error| self.read_error(error))?.len()),
         }

@@ -427,6 +427,9 @@ fn export(
             Err(error) => return Err(error.into()),
         };
         let path = files.write(&format!("map.{}", format.extension), &bytes);
+        if let Some((extension, write)) = format.companion {
+            files.write(&format!("map.{extension}"), &write(map)?);
+        }
         paths.insert(name.to_owned(), path);
     }
     Ok(paths)

@@ -180,14 +180,21 @@ pub fn map_description<'a>(
     Ok(description)
 }
 
-/// Writes a map to a file.
+/// Writes a map to a file, and what its format has no place for to a second one.
 pub fn write_map(
     path: &Path,
     format: &MapFormat,
     map: &CompressorMap,
     existing: Existing,
 ) -> Result<(), SessionError> {
-    write_file(path, &format.write(map)?, existing)
+    let companion =
+        format.companion.map(|(extension, write)| Ok::<_, SessionError>((extension, write(map)?)));
+    let companion = companion.transpose()?;
+    write_file(path, &format.write(map)?, existing)?;
+    match companion {
+        Some((extension, bytes)) => write_file(&path.with_extension(extension), &bytes, existing),
+        None => Ok(()),
+    }
 }
 
 /// Writes a map to a file. A format that tabulates the whole map gets a fitted one. Returns the written map and whether it was fitted here.

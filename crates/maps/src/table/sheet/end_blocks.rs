@@ -2,9 +2,10 @@
 
 use crate::table::column::Column;
 use crate::table::description::DescribedColumns;
-use crate::table::quantity::{Quantity, end_in, end_of_title, is_end_title};
+use crate::table::quantity::{Quantity, end_in, end_of_title, is_end_title, names_margin};
 use crate::table::sheet::grid::{Grid, GridRow};
-use crate::table::sheet::layout::{self, Layout, columns};
+use crate::table::sheet::headings::Headings;
+use crate::table::sheet::layout::{self, Group, Layout, columns};
 use mapper_core::{ImportRemark, LineEnd};
 use mapper_table::is_units_row_of_names;
 use std::ops::Range;
@@ -16,16 +17,20 @@ struct EndBlock {
     rows: Range<usize>,
     count: usize,
     is_comment: bool,
-    /// Whether its rows are points of the surge line in the columns of the table.
+    has_heading: bool,
+    /// Whether it may be the surge line: that is its title, and its heading is known.
     is_read: bool,
+    /// The columns of the surge line: those of its own heading, else those of the table.
+    columns: Vec<Column>,
 }
 
 pub(crate) struct EndBlocks(Vec<EndBlock>);
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum RowUse {
+pub(crate) enum RowUse<'a> {
     Line,
-    SurgeLine,
+    /// A point in these columns.
+    SurgeLine(&'a [Column]),
     /// None.
     Unused,
 }
@@ -53,11 +58,14 @@ impl EndBlocks {
                 (_, None) if row.is_comment => {}
                 (Some(block), None) if numbers > 0 && !is_line_title(row) => block.count += 1,
                 (Some(block), None) if numbers == 0 && block.count == 0 && index + 1 != layout.first_row => {
-                    let is_as_above = match is_heading {
-                        true => has_columns(described, layout, row),
-                        false => repeats_units(row) || !is_units_row_of_names(&row.cells),
+                    let is_known = match is_heading {
+                        true => block.set_heading(grid, described, (index, row)),
+                        // Those of its heading are in its columns.
+                        false => {
+                            block.has_heading || repeats_units(row) || !is_units_row_of_names(&row.cells)
+                        }
                     };
-                    block.is_read &= is_as_above;
+                    block.is_read &= is_known;
                 }
                 // `Surge 0.04 1.3` in place of the speed.
                 (None, None) if numbers >= 2 && row.cells.first().is_some_and(|c| end_in(c).is_some()) => {
@@ -67,7 +75,9 @@ impl EndBlocks {
                 (_, title) => {
                     blocks.extend(open.take().map(|block| block.until(index)));
                     open = title.map(|end| EndBlock {
-                        is_read: end == LineEnd::Surge && layout.groups.len() == 1,
+                        is_read: end == LineEnd::Surge
+                            && layout.groups.len() == 1
+                            && !names_margin(&row.text()),
                         ..EndBlock::titled(row, index)
                     });
                 }
@@ -77,22 +87,25 @@ impl EndBlocks {
         let titles: Vec<String> = blocks.iter().map(|block| block.title.clone()).collect();
         blocks.retain(|block| block.count > 0);
         for block in &mut blocks {
-            block.is_read &= block.has_points(grid, layout);
+            if !block.has_heading {
+                block.columns = block.columns_of_table(grid, layout);
+            }
+            block.is_read &= block.has_points(grid);
         }
         // A word that is repeated, or a comment, may name the end of the line above it.
         let is_mark = |block: &EndBlock| {
             let is_repeated = titles.iter().filter(|title| **title == block.title).count() > 1;
-            (is_repeated || block.is_comment) && block.repeats_speeds(grid, layout)
+            (is_repeated || block.is_comment) && block.repeats_speeds(grid)
         };
         blocks.retain(|block| block.is_read || !is_mark(block));
         EndBlocks(blocks)
     }
 
     /// What a row is for.
-    pub(crate) fn use_of(&self, index: usize) -> RowUse {
+    pub(crate) fn use_of(&self, index: usize) -> RowUse<'_> {
         match self.0.iter().find(|block| block.rows.contains(&index)) {
             None => RowUse::Line,
-            Some(block) if block.is_read && index > block.rows.start => RowUse::SurgeLine,
+            Some(block) if block.is_read && index > block.rows.start => RowUse::SurgeLine(&block.columns),
             Some(_) => RowUse::Unused,
         }
     }
@@ -111,24 +124,36 @@ fn count_numbers(grid: &Grid, row: &GridRow) -> usize {
     row.cells.iter().filter(|cell| grid.number(cell).is_some()).count()
 }
 
-/// Whether a heading within a block has the table's columns in their places.
-fn has_columns(described: &DescribedColumns, layout: &Layout, row: &GridRow) -> bool {
-    let known: Vec<&Column> = layout.groups.iter().flat_map(|group| &group.columns).collect();
-    columns(described, &row.cells).is_ok_and(|own| {
-        own.iter().all(|column| {
-            known.iter().any(|known| {
-                known.index == column.index
-                    && known.quantity == column.quantity
-                    && (!column.has_unit() || known.unit == column.unit)
-            })
-        })
-    })
-}
-
 impl EndBlock {
     fn titled(row: &GridRow, index: usize) -> EndBlock {
         let title = row.text().split_whitespace().collect::<Vec<_>>().join(" ");
-        EndBlock { title, rows: index..index, count: 0, is_comment: row.is_comment, is_read: false }
+        let is_comment = row.is_comment;
+        EndBlock {
+            title,
+            rows: index..index,
+            count: 0,
+            is_comment,
+            has_heading: false,
+            is_read: false,
+            columns: Vec::new(),
+        }
+    }
+
+    /// Takes the columns of a heading, with the units below it; whether they are all known.
+    fn set_heading(
+        &mut self,
+        grid: &Grid,
+        described: &DescribedColumns,
+        (index, row): (usize, &GridRow),
+    ) -> bool {
+        // Below the names there may be a row of units.
+        if self.has_heading {
+            return true;
+        }
+        let found = columns(described, &Headings::of(grid, index, row).cells);
+        self.has_heading = found.is_ok();
+        self.columns = found.unwrap_or_default();
+        self.has_heading
     }
 
     fn until(mut self, end: usize) -> EndBlock {
@@ -143,30 +168,49 @@ impl EndBlock {
         rows.iter().filter(has_number).map(number).collect()
     }
 
-    fn speeds(&self, grid: &Grid, layout: &Layout) -> Vec<Option<f64>> {
-        let group = layout.groups.first();
-        let column = group.and_then(|group| group.columns.get(group.speed_column()?));
-        column.map(|column| self.numbers(grid, column)).unwrap_or_default()
-    }
-
-    fn repeats_speeds(&self, grid: &Grid, layout: &Layout) -> bool {
-        let mut speeds: Vec<f64> = self.speeds(grid, layout).into_iter().flatten().collect();
+    fn repeats_speeds(&self, grid: &Grid) -> bool {
+        let is_speed = |column: &&Column| matches!(column.quantity, Quantity::Speed | Quantity::ReducedSpeed);
+        let column = self.columns.iter().find(is_speed);
+        let mut speeds: Vec<f64> = column
+            .map(|column| self.numbers(grid, column))
+            .unwrap_or_default()
+            .into_iter()
+            .flatten()
+            .collect();
         speeds.sort_by(f64::total_cmp);
         speeds.windows(2).any(|pair| pair[0] == pair[1])
     }
 
-    /// Whether every row is one point of the surge line: its own speed, and all columns but the efficiency.
-    fn has_points(&self, grid: &Grid, layout: &Layout) -> bool {
-        let needed = layout.groups.iter().flat_map(|group| &group.columns).filter(|column| {
+    /// The columns of the table; without that of the speed if the rows are shorter by one cell.
+    fn columns_of_table(&self, grid: &Grid, layout: &Layout) -> Vec<Column> {
+        let table = layout.groups.first().map_or(&[][..], |group| group.columns.as_slice());
+        let rows = grid.rows.get(self.rows.clone()).unwrap_or_default().iter().filter(|row| !row.is_comment);
+        let width = rows.map(|row| row.cells.iter().filter(|cell| grid.number(cell).is_some()).count()).max();
+        let place = |quantity: Quantity| table.iter().find(|column| column.quantity == quantity);
+        match (place(Quantity::Speed), place(Quantity::Flow), place(Quantity::PressureRatio)) {
+            (Some(speed), Some(flow), Some(ratio))
+                if grid.is_blank_separated && width == Some(2) && speed.index == 0 =>
+            {
+                [flow, ratio].map(|column| column.clone().at(column.index - 1)).to_vec()
+            }
+            _ => table.to_vec(),
+        }
+    }
+
+    /// Whether every row is one point of the surge line: all columns but the efficiency, and each speed once.
+    fn has_points(&self, grid: &Grid) -> bool {
+        let needed = self.columns.iter().filter(|column| {
             column.quantity != Quantity::Efficiency
                 && !column.quantity.is_optional()
                 && column.quantity != Quantity::T2
         });
-        let is_complete = |column: &Column| self.numbers(grid, column).iter().all(Option::is_some);
-        let mut needed = needed.peekable();
-        needed.peek().is_some()
-            && needed.all(is_complete)
-            && !self.speeds(grid, layout).is_empty()
-            && !self.repeats_speeds(grid, layout)
+        let is_speed = |column: &Column| matches!(column.quantity, Quantity::Speed | Quantity::ReducedSpeed);
+        let is_complete = |column: &Column| {
+            let numbers = self.numbers(grid, column);
+            // The whole line may be without speeds.
+            numbers.iter().all(Option::is_some) || is_speed(column) && numbers.iter().all(Option::is_none)
+        };
+        let group = Group { columns: self.columns.clone(), ..Group::default() };
+        group.is_complete() && needed.into_iter().all(is_complete) && !self.repeats_speeds(grid)
     }
 }

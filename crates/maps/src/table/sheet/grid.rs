@@ -157,6 +157,12 @@ impl Grid {
         self.rows.iter().map(line).collect()
     }
 
+    /// The first two numbers of every row.
+    pub(crate) fn places(&self) -> Vec<[f64; 2]> {
+        let place = |row: &GridRow| Some([self.number(row.cells.first()?)?, self.number(row.cells.get(1)?)?]);
+        self.rows.iter().filter_map(place).collect()
+    }
+
     /// The number in a cell; one with a percent sign as a fraction. `None` for empty cells and text.
     pub(crate) fn number(&self, cell: &str) -> Option<f64> {
         let (text, factor) = match cell.strip_suffix('%') {

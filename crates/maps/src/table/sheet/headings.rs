@@ -5,7 +5,9 @@ use crate::table::column::{merge_units_row, parts};
 use crate::table::sheet::grid::{Grid, GridRow};
 use mapper_core::ImportRemark;
 use mapper_core::unit_factors::RPM_PER_KRPM;
-use mapper_table::{ColumnName, Word, bare_unit, header_unit, is_dimensionless, is_unit, is_units_row};
+use mapper_table::{
+    ColumnName, Word, bare_unit, header_unit, is_dimensionless, is_missing_mark, is_unit, is_units_row,
+};
 use mapper_yaml::units::{Kind, Unit};
 use std::ops::RangeInclusive;
 
@@ -15,14 +17,15 @@ pub(crate) struct Headings {
     /// The names with the units of the row below.
     pub(crate) cells: Vec<String>,
     pub(crate) first_row: usize,
+    /// A row of words below the names that is not understood, if the units are not known from elsewhere.
+    unknown_row: Option<String>,
 }
 
 impl Headings {
     pub(crate) fn of(grid: &Grid, index: usize, row: &GridRow) -> Headings {
         let above = index.checked_sub(1).and_then(|above| grid.rows.get(above));
-        let names = above
-            .filter(|above| !grid.is_blank_separated && is_row_of_groups(above, row))
-            .map_or_else(|| row.cells.clone(), |above| with_groups(&above.cells, &row.cells));
+        let names = merged_above(grid, index, row)
+            .map_or_else(|| row.cells.clone(), |groups| with_groups(&groups, &row.cells));
         // Symbols or a comment may be between names and units; in some tables the units come first.
         let is_number = |cell: &String| grid.number(cell).is_some() && !is_unit(cell);
         let near = grid.rows.iter().enumerate().skip(index + 1).take(MAX_ROWS_TO_UNITS);
@@ -34,11 +37,21 @@ impl Headings {
             known.count() > 1 && is_units_row(&row.cells)
         };
         let above = || Some((index + 1, merge_units_row(&names, &above.filter(is_units)?.cells)?));
-        let (first_row, cells) = below.or_else(above).unwrap_or_else(|| (index + 1, names.clone()));
-        Headings { cells, names, first_row }
+        let found = below.or_else(above);
+        let unknown_row = grid.rows.get(index + 1).filter(|row| found.is_none() && is_unknown(row));
+        let unknown_row = unknown_row.map(GridRow::text);
+        let (first_row, cells) = found.unwrap_or_else(|| (index + 1, names.clone()));
+        Headings { cells, names, first_row, unknown_row }
     }
 
-    pub(crate) fn unused(&self, used: &[usize]) -> Option<ImportRemark> {
+    /// Remarks about what is not used.
+    pub(crate) fn remarks(&self, used: &[usize]) -> impl Iterator<Item = ImportRemark> {
+        let unknown = self.unknown_row.iter().map(|text| text.chars().take(60).collect::<String>());
+        let unknown = unknown.map(|title| ImportRemark::UnusedBlock { title, rows: 1 });
+        unknown.chain(self.unused(used)).collect::<Vec<_>>().into_iter()
+    }
+
+    fn unused(&self, used: &[usize]) -> Option<ImportRemark> {
         let unused =
             self.cells.iter().enumerate().filter(|(index, cell)| !cell.is_empty() && !used.contains(index));
         let headings: Vec<String> =
@@ -47,12 +60,40 @@ impl Headings {
     }
 }
 
+/// Whether a row between names and numbers has words of no known kind, which may be units.
+fn is_unknown(row: &GridRow) -> bool {
+    let filled = || row.cells.iter().filter(|cell| !is_missing_mark(cell));
+    let is_other = |cell: &String| {
+        !cell.contains(|c: char| c.is_ascii_digit()) && ColumnName::read(cell).measured().is_none()
+    };
+    !row.is_comment && filled().count() > 1 && filled().all(is_other)
+}
+
 /// Rows from names to units. Bound: symbols and a description may be between them.
 const MAX_ROWS_TO_UNITS: usize = 3;
 /// Maximum number of unused columns that a remark names. Bound: a longer list is not read.
 const MAX_NAMED: usize = 20;
 
-/// Whether merged cells above a row name the machines of its columns. A title stands alone in the first column.
+/// The text of merged cells above each column: the machine, or the machine and the place from two rows (`Compressor` above `Inlet`).
+fn merged_above(grid: &Grid, index: usize, row: &GridRow) -> Option<Vec<String>> {
+    let at = |above: usize| index.checked_sub(above).and_then(|at| grid.rows.get(at));
+    let above = at(1).filter(|_| !grid.is_blank_separated).filter(|above| is_row_of_groups(above, row))?;
+    let top =
+        at(2).filter(|top| is_row_of_groups(top, row) && top.cells.iter().any(|cell| names_machine(cell)));
+    let (mut group, mut place) = ("", "");
+    let text = (0..row.cells.len()).map(|column| {
+        if let Some(cell) = top.and_then(|top| top.cells.get(column)).filter(|cell| !cell.is_empty()) {
+            (group, place) = (cell.as_str(), "");
+        }
+        if let Some(cell) = above.cells.get(column).filter(|cell| !cell.is_empty()) {
+            place = cell.as_str();
+        }
+        format!("{group} {place}").trim().to_owned()
+    });
+    Some(text.collect())
+}
+
+/// Whether merged cells above a row name machines or places of its columns. A title stands alone in the first column.
 fn is_row_of_groups(above: &GridRow, row: &GridRow) -> bool {
     let filled = || above.cells.iter().enumerate().filter(|(_, cell)| !cell.is_empty());
     let has_gap = |(index, cell): (usize, &String)| {
@@ -61,7 +102,7 @@ fn is_row_of_groups(above: &GridRow, row: &GridRow) -> bool {
     !above.is_comment
         && filled().any(|(index, _)| index > 0)
         && filled().all(|(_, cell)| !cell.contains(|c: char| c.is_ascii_digit()))
-        && filled().any(|(_, cell)| names_machine(cell))
+        && (filled().any(|(_, cell)| names_machine(cell)) || filled().all(|(_, cell)| names_place(cell)))
         && row.cells.iter().enumerate().any(has_gap)
 }
 
@@ -70,13 +111,17 @@ fn names_machine(text: &str) -> bool {
     [Word::Compressor, Word::Turbine, Word::Shaft, Word::Oil].iter().any(|word| name.has(*word))
 }
 
-/// The names with the machine above them, which a merged cell has only in its first column: `p in [kPa]` below `Turbine` becomes
-/// `p in Turbine [kPa]`.
+fn names_place(text: &str) -> bool {
+    let name = ColumnName::read(text);
+    [Word::In, Word::Out, Word::Before, Word::After].iter().any(|word| name.has(*word))
+}
+
+/// The names with the machine or place above them: `p in [kPa]` below `Turbine` becomes `p in Turbine [kPa]`.
 fn with_groups(above: &[String], cells: &[String]) -> Vec<String> {
-    let mut group = "";
-    let named = cells.iter().enumerate().map(|(index, cell)| {
-        group = above.get(index).filter(|cell| !cell.is_empty()).map_or(group, String::as_str);
-        if cell.is_empty() || !names_machine(group) || names_machine(cell) {
+    let named = cells.iter().zip(above).map(|(cell, group)| {
+        let is_group =
+            names_machine(group) && !names_machine(cell) || names_place(group) && !names_place(cell);
+        if cell.is_empty() || !is_group {
             return cell.clone();
         }
         match parts(cell) {

@@ -57,7 +57,7 @@ impl Group {
         self.has_all(&[Quantity::P3, Quantity::P4, Quantity::T3])
     }
 
-    fn is_complete(&self) -> bool {
+    pub(crate) fn is_complete(&self) -> bool {
         self.has_flow() && (self.has(&[Quantity::PressureRatio]) || self.is_measured())
     }
 }
@@ -73,7 +73,7 @@ impl Layout {
     fn below(headings: &Headings, groups: Vec<Group>) -> Layout {
         let used: Vec<usize> =
             groups.iter().flat_map(|group| &group.columns).map(|column| column.index).collect();
-        let remarks = headings.unused(&used).into_iter().collect();
+        let remarks = headings.remarks(&used).collect();
         Layout { groups, first_row: headings.first_row, remarks }
     }
 
@@ -179,11 +179,15 @@ fn heading_in_usual_order(
     let mut layout = layout_without_headings(grid, described).ok().flatten()?;
     let (_, index) = incomplete?;
     let group = layout.groups.first_mut()?;
-    let named = columns(described, &grid.rows.get(index)?.cells).ok()?;
-    let in_order = named
-        .iter()
-        .zip(&group.columns)
-        .all(|(named, usual)| named.index == usual.index && named.quantity == usual.quantity);
+    let cells = &grid.rows.get(index)?.cells;
+    let named = columns(described, cells).ok()?;
+    // A name that is not known is that of another quantity.
+    let is_all = cells.iter().filter(|cell| cell.contains(char::is_alphabetic)).count() == named.len();
+    let in_order = is_all
+        && named
+            .iter()
+            .zip(&group.columns)
+            .all(|(named, usual)| named.index == usual.index && named.quantity == usual.quantity);
     if !in_order || index >= layout.first_row {
         return None;
     }
@@ -225,7 +229,7 @@ fn is_turbine_title(row: &GridRow) -> bool {
 /// The columns with recognised headings. Of two with the same quantity a map needs the total or corrected one, a table of measured points
 /// the total or measured one; else the first counts.
 pub(crate) fn columns(described: &DescribedColumns, cells: &[String]) -> Result<Vec<Column>, ColumnError> {
-    let spellings = with_machine_letters(cells);
+    let spellings = with_machine_letters(cells, described.bare_is_compressor);
     let (mut all, mut wrong): (Vec<Column>, Vec<ColumnError>) = (Vec::new(), Vec::new());
     for (index, cell) in
         cells.iter().enumerate().filter(|(_, cell)| cell.contains(char::is_alphabetic) || cell.contains('%'))
@@ -242,8 +246,16 @@ pub(crate) fn columns(described: &DescribedColumns, cells: &[String]) -> Result<
     if let Some(error) = wrong.into_iter().find(is_missing) {
         return Err(error);
     }
-    let is_map = all.iter().any(|column| column.quantity == Quantity::PressureRatio);
-    let rank = |column: &Column| (column.is_static(), column.is_corrected() != is_map);
+    let has = |quantity: Quantity| all.iter().any(|column| column.quantity == quantity);
+    let is_map = has(Quantity::PressureRatio);
+    // Readings are corrected here, so that a corrected flow beside them would be corrected twice.
+    let is_measured = !is_map && (has(Quantity::P2) || has(Quantity::P3));
+    all.retain(|column| {
+        !(is_measured
+            && column.is_corrected()
+            && matches!(column.quantity, Quantity::Speed | Quantity::Flow | Quantity::TurbineFlow))
+    });
+    let rank = |column: &Column| (column.is_command(), column.is_static(), column.is_corrected() != is_map);
     let mut columns: Vec<Column> = Vec::new();
     for column in all {
         match columns.iter_mut().find(|known| known.quantity == column.quantity) {

@@ -16,12 +16,12 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 /// Minimum median of efficiencies in per cent. Bound: fractions are at most 1, and usable points have at least 1 %.
-const MIN_PERCENTAGE: f64 = 1.5;
+pub(crate) const MIN_PERCENTAGE: f64 = 1.5;
 
 pub(crate) struct Point<'a> {
     /// Line of the file, from 1.
     pub(crate) at: usize,
-    group: &'a layout::Group,
+    columns: &'a [Column],
     pub(crate) speed: Option<f64>,
     pub(crate) vane: Option<f64>,
     values: Vec<Option<f64>>,
@@ -33,8 +33,8 @@ pub(crate) struct Point<'a> {
 
 impl Point<'_> {
     pub(crate) fn cell(&self, quantity: Quantity) -> Option<(&Column, f64)> {
-        let position = self.group.columns.iter().position(|column| column.quantity == quantity)?;
-        Some((self.group.columns.get(position)?, self.values.get(position).copied().flatten()?))
+        let position = self.columns.iter().position(|column| column.quantity == quantity)?;
+        Some((self.columns.get(position)?, self.values.get(position).copied().flatten()?))
     }
 
     /// A value in SI and rpm, corrected to a reference state.
@@ -44,13 +44,14 @@ impl Point<'_> {
     }
 }
 
-/// Mark of the format `fitted` for a node beyond the measured points.
-const EXTRAPOLATED: &str = "extrapolated";
+/// Marks of the format `fitted` for a node beyond the measured points, and for one that does not compress.
+const NO_POINTS: [&str; 2] = ["extrapolated", "unusable"];
 
 pub(crate) fn points<'a>(
     grid: &Grid,
     described: &DescribedColumns,
     layout: &'a Layout,
+    blocks: &'a EndBlocks,
     remarks: &mut Vec<ImportRemark>,
 ) -> Result<Vec<Point<'a>>, ImportError> {
     let mut points = Vec::new();
@@ -58,14 +59,15 @@ pub(crate) fn points<'a>(
     // The title of the first block may be above the headings, which may have a row of units.
     let above = grid.rows.iter().take(layout.first_row).rev().take(3);
     let mut vane = above.filter_map(|row| layout::vane_of_title(grid, described, row)).next();
-    let blocks = EndBlocks::of(grid, described, layout);
     for group in &layout.groups {
         let (mut speed, mut last_speed) = (group.speed_rpm, None);
         for (index, row) in grid.rows.iter().enumerate() {
             let row_use = blocks.use_of(index);
-            let is_of_surge_line = row_use == RowUse::SurgeLine;
-            let is_above = index < layout.first_row && !is_of_surge_line;
-            if is_above || row.is_comment || row_use == RowUse::Unused {
+            if let RowUse::SurgeLine(columns) = row_use {
+                points.extend(surge_point(grid, row, columns));
+                continue;
+            }
+            if index < layout.first_row || row.is_comment || row_use == RowUse::Unused {
                 continue;
             }
             let cell = |index: usize| row.cells.get(index).map_or("", String::as_str);
@@ -92,7 +94,7 @@ pub(crate) fn points<'a>(
             if layout::is_heading(described, row) || above.is_some_and(|above| above.cells == row.cells) {
                 continue;
             }
-            if row.cells.iter().any(|cell| cell == EXTRAPOLATED) {
+            if row.cells.iter().any(|cell| NO_POINTS.contains(&cell.as_str())) {
                 extrapolated += 1;
                 continue;
             }
@@ -109,7 +111,7 @@ pub(crate) fn points<'a>(
                 continue;
             }
             check_point_count(points.len(), row.at)?;
-            let mut values = values(grid, row, group, is_of_surge_line)?;
+            let mut values = values(grid, row, group)?;
             if let Some(place) = group.speed_column().and_then(|position| values.get_mut(position)) {
                 match place {
                     Some(own) => last_speed = Some(*own),
@@ -120,7 +122,8 @@ pub(crate) fn points<'a>(
                 }
             }
             let end = row.cells.iter().find_map(|cell| end_in(cell));
-            points.push(Point { at: row.at, group, speed, vane, values, end, is_of_surge_line });
+            let columns = group.columns.as_slice();
+            points.push(Point { at: row.at, columns, speed, vane, values, end, is_of_surge_line: false });
         }
     }
     remarks.extend(blocks.remarks());
@@ -133,13 +136,17 @@ pub(crate) fn points<'a>(
     Ok(points)
 }
 
+/// The point of a row below the title of the surge line; `None` for a row without numbers.
+fn surge_point<'a>(grid: &Grid, row: &GridRow, columns: &'a [Column]) -> Option<Point<'a>> {
+    let number = |column: &Column| row.cells.get(column.index).and_then(|cell| grid.number(cell));
+    let values: Vec<Option<f64>> = columns.iter().map(number).collect();
+    let is_point = !row.is_comment && values.iter().any(Option::is_some);
+    let (at, end) = (row.at, Some(LineEnd::Surge));
+    is_point.then_some(Point { at, columns, speed: None, vane: None, values, end, is_of_surge_line: true })
+}
+
 /// The numbers of a row by column.
-fn values(
-    grid: &Grid,
-    row: &GridRow,
-    group: &layout::Group,
-    is_of_surge_line: bool,
-) -> Result<Vec<Option<f64>>, ImportError> {
+fn values(grid: &Grid, row: &GridRow, group: &layout::Group) -> Result<Vec<Option<f64>>, ImportError> {
     let mut values = Vec::with_capacity(group.columns.len());
     for column in &group.columns {
         let text = row.cells.get(column.index).map_or("", String::as_str);
@@ -158,8 +165,7 @@ fn values(
     let needed = group.columns.iter().map(|column| column.index + 1).max().unwrap_or(0);
     let is_short =
         group.bare_cells > 0 && filled != group.bare_cells || grid.is_blank_separated && filled < needed;
-    // A surge line has no efficiencies.
-    if is_short && !is_of_surge_line {
+    if is_short {
         let text = row.text().chars().take(60).collect();
         return Err(ImportError::RowForm { line: row.at, text, form: ROW_FORM });
     }
@@ -198,7 +204,7 @@ pub(crate) fn columns(
                 |reference| column.to_corrected_si(value, reference),
             ))
         };
-        let values = points.iter().filter_map(value);
+        let values = points.iter().filter(|point| !point.is_of_surge_line).filter_map(value);
         let (low, high) = range(values);
         columns.push(ImportedColumn {
             heading: column.heading.clone(),

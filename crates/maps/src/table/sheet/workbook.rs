@@ -4,6 +4,7 @@ use crate::table::quantity::end_in;
 use crate::table::sheet::grid::{Grid, GridRow, MAX_ROWS, count_number_cells, text_of};
 use crate::table::sheet::headings::without_speed;
 use crate::table::sheet::points::{points_of_matrices, quantity_of_title};
+use mapper_core::unit_factors::PERCENT;
 use mapper_core::{ImportError, MAP_FILE_SIZE_LIMIT};
 use mapper_table::{Book, Value, XlsxLimits, decimal_sign_of_cells, is_workbook, parse_number};
 use std::borrow::Cow;
@@ -143,33 +144,81 @@ pub fn file_text(bytes: &[u8]) -> Result<String, ImportError> {
     if is_workbook(&bytes) { Ok(grid_of_workbook(&bytes, None)?.csv()) } else { text_of(&bytes) }
 }
 
-/// One text of files with a speed line each, named after its speed or as the surge line (`45000.csv`, `surge.csv`), as digitisers write them.
+/// One text of files with a speed line each, named after its speed or as the surge line (`45000.csv`, `surge.csv`), as digitisers write them. Files
+/// named after an efficiency (`eta_0.72.csv`) are its contours: where they cross a line, it has a point with that efficiency.
 pub fn text_of_lines(files: &[(String, Vec<u8>)]) -> Result<String, ImportError> {
-    let mut lines: Vec<(f64, String)> = Vec::new();
+    let mut lines: Vec<(f64, String, Grid)> = Vec::new();
+    let mut contours: Vec<(f64, Vec<[f64; 2]>)> = Vec::new();
     for (name, bytes) in files {
         let mut grid = Grid::of_text(&text_of(&unpack(bytes)?)?)?;
         grid.rows.retain(|row| !row.is_comment);
-        let (speed_rpm, title) = match without_speed(&grid, name) {
-            Some((_, speed_rpm)) => (speed_rpm, format!("{speed_rpm} rpm")),
-            None if end_in(name).is_some() => (f64::INFINITY, name.clone()),
-            None => {
-                let form = "the speed of a line, as in `45000.csv`, or `surge.csv`";
-                return Err(ImportError::RowForm { line: 1, text: name.clone(), form });
-            }
-        };
-        let has_heading =
-            grid.rows.iter().any(|row| row.cells.iter().any(|c| c.contains(char::is_alphabetic)));
-        let width = grid.rows.iter().map(|row| row.cells.len()).max().unwrap_or_default();
-        // `Q` is a flow without a unit, which the user has to state.
-        let heading = match (has_heading, width) {
-            (true, _) => "",
-            (false, ..=2) => "Q,PR\n",
-            (false, _) => "Q,PR,efficiency\n",
-        };
-        lines.push((speed_rpm, format!("{title}\n{heading}{}", grid.csv())));
+        match without_speed(&grid, name) {
+            Some((_, speed_rpm)) => lines.push((speed_rpm, format!("{speed_rpm} rpm"), grid)),
+            None if end_in(name).is_some() => lines.push((f64::INFINITY, name.clone(), grid)),
+            None => match efficiency_in(name) {
+                Some(eta) => contours.push((eta, grid.places())),
+                None => {
+                    let form = "the speed of a line, as in `45000.csv`, an efficiency (`eta_0.72.csv`) or `surge.csv`";
+                    return Err(ImportError::RowForm { line: 1, text: name.clone(), form });
+                }
+            },
+        }
     }
     lines.sort_by(|a, b| a.0.total_cmp(&b.0));
-    Ok(lines.into_iter().map(|(_, text)| text).collect())
+    let mut text = String::new();
+    for (_, title, grid) in &lines {
+        let is_name = |row: &&GridRow| row.cells.iter().any(|cell| cell.contains(char::is_alphabetic));
+        let heading = grid.rows.iter().find(is_name);
+        let width = grid.rows.iter().map(|row| row.cells.len()).max().unwrap_or_default();
+        if width == 2 && !contours.is_empty() {
+            let names = heading.map_or_else(|| "Q,PR".to_owned(), |row| row.cells.join(","));
+            text += &format!("{title}\n{names},efficiency\n");
+            let line = grid.places();
+            line.iter().for_each(|[flow, ratio]| text += &format!("{flow},{ratio},\n"));
+            for (eta, contour) in &contours {
+                crossings(&line, contour)
+                    .for_each(|[flow, ratio]| text += &format!("{flow},{ratio},{eta}\n"));
+            }
+            continue;
+        }
+        // `Q` is a flow without a unit, which the user has to state.
+        let names = match (heading, width) {
+            (Some(_), _) => "",
+            (None, ..=2) => "Q,PR\n",
+            (None, _) => "Q,PR,efficiency\n",
+        };
+        text += &format!("{title}\n{names}{}", grid.csv());
+    }
+    Ok(text)
+}
+
+/// Range of the efficiency of a contour. Bound: figures have no others.
+const CONTOUR_ETAS: std::ops::RangeInclusive<f64> = 0.2..=0.95;
+
+/// The efficiency that a file is named after: `eta_0.72`, `72%`, `eff70`.
+fn efficiency_in(name: &str) -> Option<f64> {
+    let lower = name.to_lowercase();
+    let is_digit = |c: char| c.is_ascii_digit() || c == '.';
+    let number: f64 = lower.split(|c| !is_digit(c)).find_map(|word| word.parse().ok())?;
+    let is_named = ["eta", "eff", "η", "island", "wirkungsgrad", "rendement", "%"]
+        .iter()
+        .any(|word| lower.contains(word));
+    let eta = if number > 1.0 { number / PERCENT } else { number };
+    (CONTOUR_ETAS.contains(&eta) && (is_named || number < 1.0)).then_some(eta)
+}
+
+/// The places where two polylines cross.
+fn crossings<'a>(a: &'a [[f64; 2]], b: &'a [[f64; 2]]) -> impl Iterator<Item = [f64; 2]> + 'a {
+    let between = |from: [f64; 2], to: [f64; 2]| [to[0] - from[0], to[1] - from[1]];
+    let cross = |u: [f64; 2], v: [f64; 2]| u[0] * v[1] - u[1] * v[0];
+    let pairs = a.windows(2).flat_map(|s| b.windows(2).map(move |t| (s, t)));
+    pairs.filter_map(move |(s, t)| {
+        let (along, other, gap) = (between(s[0], s[1]), between(t[0], t[1]), between(s[0], t[0]));
+        let area = cross(along, other);
+        let share = cross(gap, other) / area;
+        let inside = (0.0..1.0).contains(&share) && (0.0..1.0).contains(&(cross(gap, along) / area));
+        inside.then(|| [s[0][0] + share * along[0], s[0][1] + share * along[1]])
+    })
 }
 
 /// Unpacks a gzip file; returns any other content unchanged.

@@ -36,3 +36,29 @@ fn a_fault_free_turbo_a_has_no_finding() {
         ],
     );
 }
+
+/// Air and a valve that follow later than declared are named with the delay that the lab has, and no point depends on it.
+#[test]
+fn a_late_air_supply_and_a_late_valve_are_named_with_their_delays() {
+    let file = CampaignFile::shipped_with(&[
+        ("virtual_lab: {}", "virtual_lab: {effects: {slow_valve: 2 s, actuator_lag: 3 s}}"),
+        (
+            "speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]",
+            "speeds: [50 krpm, 80 krpm, 110 krpm, 140 krpm]",
+        ),
+        ("openings: [0.5, 0.7, 1.0, 1.4, 2.0, 2.5]", "openings: [0.5, 1.0, 2.0]"),
+    ]);
+    let run = Path::new(shared_run(&file).result["run"].as_str().unwrap()).to_owned();
+    let points: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(run.join("points.json")).unwrap()).unwrap();
+    let faults = points["faults"].as_array().unwrap();
+    for (name, delay_s) in [
+        ("delay of P3 behind its command", 2.7),
+        ("delay of the back-pressure valve behind its command", 2.0),
+    ] {
+        let fault = faults.iter().find(|fault| fault["fault"] == name).unwrap_or_else(|| panic!("{faults:?}"));
+        let (value, sigma) = (fault["value"].as_f64().unwrap(), fault["sigma"].as_f64().unwrap());
+        assert!((value - delay_s).abs() < 3.0 * sigma && sigma < 0.3, "{fault}");
+        assert_eq!(fault["touches_points"], false, "{fault}");
+    }
+}

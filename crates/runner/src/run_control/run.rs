@@ -372,17 +372,8 @@ impl Run<'_, '_> {
 
     /// Switches the air off before a step that a standstill precedes.
     fn rest_before(&mut self, step: &PlanStep) -> Result<(), Halt> {
-        let duration_s = self.runner.steps.rest_s();
-        if duration_s > 0.0 {
+        if let Some(soak) = self.runner.steps.rest() {
             self.unload()?;
-            let oil_temperature_k = step.oil_temperature_k;
-            let soak = Soak {
-                duration_s,
-                until_settled: false,
-                oil_temperature_k,
-                temperature_sigma_k: 0.0,
-                pressure_sigma_pa: 0.0,
-            };
             self.soak(step, soak)?;
             (self.at, self.commanded.valve) = (None, None);
         }
@@ -396,13 +387,18 @@ impl Run<'_, '_> {
             oil_temperature_k: soak.oil_temperature_k,
             ..setpoints(first)
         })?;
+        // A rest without a stated non-uniformity is no zero.
+        let (name, kinds) = match soak.temperature_sigma_k > 0.0 {
+            true => ("soak", [EventKind::SoakStarted, EventKind::SoakEnded]),
+            false => ("rest", [EventKind::Note, EventKind::Note]),
+        };
         let message = format!(
-            "soak for {}{:.1} min: air off, oil at {}",
+            "{name} for {}{:.1} min: air off, oil at {}",
             if soak.until_settled { "at least " } else { "" },
             soak.duration_s / 60.0,
             mapper_core::temperature(soak.oil_temperature_k)
         );
-        let (t_s, kind) = (self.now_s, EventKind::SoakStarted);
+        let (t_s, kind) = (self.now_s, kinds[0]);
         self.runner.observer.on_event(&Event { t_s, kind, message })?;
         let start_s = self.now_s;
         self.run_until(start_s + soak.duration_s, false, false)?;
@@ -411,11 +407,11 @@ impl Run<'_, '_> {
             self.run_until((self.now_s + REST_CHECK_S).min(start_s + Soak::LONGEST_S), false, false)?;
         }
         let message = if soak.until_settled {
-            format!("soak completed after {:.1} min, air on", (self.now_s - start_s) / 60.0)
+            format!("{name} completed after {:.1} min, air on", (self.now_s - start_s) / 60.0)
         } else {
-            "soak completed, air on".to_owned()
+            format!("{name} completed, air on")
         };
-        let (t_s, kind) = (self.now_s, EventKind::SoakEnded);
+        let (t_s, kind) = (self.now_s, kinds[1]);
         self.runner.observer.on_event(&Event { t_s, kind, message })?;
         Ok(())
     }

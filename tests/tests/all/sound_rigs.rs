@@ -56,7 +56,8 @@ fn a_late_air_supply_and_a_late_valve_are_named_with_their_delays() {
         ("delay of P3 behind its command", 2.7),
         ("delay of the back-pressure valve behind its command", 2.0),
     ] {
-        let fault = faults.iter().find(|fault| fault["fault"] == name).unwrap_or_else(|| panic!("{faults:?}"));
+        let fault =
+            faults.iter().find(|fault| fault["fault"] == name).unwrap_or_else(|| panic!("{faults:?}"));
         let (value, sigma) = (fault["value"].as_f64().unwrap(), fault["sigma"].as_f64().unwrap());
         assert!((value - delay_s).abs() < 3.0 * sigma && sigma < 0.3, "{fault}");
         assert_eq!(fault["touches_points"], false, "{fault}");

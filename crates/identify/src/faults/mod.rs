@@ -15,7 +15,6 @@ pub(crate) mod valve_check;
 use crate::IdentifyConfig;
 use crate::faults::balance_rows::Rows;
 use crate::faults::balances::efficiency::FittedEfficiencies;
-use crate::faults::balances::motion;
 use crate::faults::balances::standstill::{self, Standstill};
 use crate::faults::balances::valve::{self, Opening, sides};
 use crate::faults::end_readings::{CHANNELS, MAX_CORRELATED_ROWS, Readings, span_s};
@@ -78,7 +77,7 @@ pub(crate) fn hypotheses(
     let mut add = |law: Law, rows: Option<Rows>| balances.extend(rows.map(|rows| (law, rows)));
     add(Law::Valve, valve::valve_rows(&opened, &noise, nominal, config.opening_is_area));
     let outlet_volume_m3 = nominal.map_or(0.0, |nominal| nominal.model.params.outlet.volume_m3);
-    for rows in motion::rows(recording, config, outlet_volume_m3) {
+    for rows in valve::motion_rows(recording, config, outlet_volume_m3) {
         add(Law::Motion, Some(rows));
     }
     add(Law::Head, balances::efficiency::head_rows(&readings, &noise, reference, nominal));

@@ -6,6 +6,7 @@ use crate::run_control::observer::{ObserverError, Operator, Protection, RunError
 use crate::run_control::speed_control::SpeedControl;
 use crate::run_control::transition_control::{Arrival, PressureMotion, TransitionControl};
 use crate::step_source::StepSource;
+use crate::surge::estimate::FastStatistics;
 use crate::surge::mark::SurgeEvents;
 use mapper_core::{
     Backend, BackendError, Clock, Event, EventKind, GuardName, OperatingPoint, PlanStep, Reaction, RigMode,
@@ -80,6 +81,7 @@ pub(crate) struct Run<'a, 'p> {
     pub(crate) arrival: Option<Arrival>,
     pub(crate) p3_motion: PressureMotion,
     surge_events: SurgeEvents,
+    fast: FastStatistics,
     /// Longest delay of P3 that was reported, s.
     pub(crate) reported_late_s: f64,
     /// Whether the valve opens at the start of the safe shutdown: after a surge.
@@ -120,6 +122,7 @@ impl Runner<'_> {
             arrival: None,
             p3_motion: PressureMotion::default(),
             surge_events: SurgeEvents::default(),
+            fast: FastStatistics::default(),
             reported_late_s: 0.0,
             opens_at_once: false,
             at: None,
@@ -443,7 +446,12 @@ impl Run<'_, '_> {
             self.check_for_stop(in_step, until_s)?;
             let before_s = self.now_s;
             let next_s = self.transition.as_ref().map_or(until_s, |control| before_s + control.interval_s());
-            let (batch, trips) = self.poll_until_trip(next_s.min(until_s), in_step)?;
+            let (mut batch, trips) = self.poll_until_trip(next_s.min(until_s), in_step)?;
+            // Fast samples are recorded at the end of a step, and where the compressor surges.
+            let surges = batch.events.iter().any(|event| event.kind == EventKind::SurgeEntered);
+            if trips.is_empty() && !surges && !(in_step && self.now_s >= until_s) {
+                batch.fast.clear();
+            }
             self.p3_motion.add(&batch);
             if let Some(trip) = trips.iter().find(|trip| trip.reaction.ends_the_run()) {
                 let trip = trip.clone();
@@ -541,6 +549,7 @@ impl Run<'_, '_> {
                 self.plausibility.as_mut().and_then(|watch| watch.judge(&mut batch, &self.commanded));
             trips.extend(judged);
             self.surge_events.join(&mut batch, next_s);
+            self.fast.add_columns(&mut batch);
             match &mut merged {
                 None => merged = Some(batch),
                 Some(merged) => merged.append(batch),

@@ -2,6 +2,5 @@
 
 pub(crate) mod efficiency;
 pub(crate) mod housing;
-pub(crate) mod motion;
 pub(crate) mod standstill;
 pub(crate) mod valve;

@@ -12,7 +12,7 @@ pub enum Suspect {
     Sensor(SensorFault),
     /// The machine is not as declared, ratio.
     Machine(Machine),
-    /// None of the others: errors of a balance over the declared ones, ratio.
+    /// None of the others: errors of a balance beyond the declared ones, ratio.
     Unmodelled(Law),
 }
 
@@ -42,13 +42,13 @@ pub enum Law {
 impl Law {
     fn name(self) -> &'static str {
         match self {
-            Law::Valve => "the back-pressure valve",
-            Law::Motion => "the actuators",
+            Law::Valve => "the valve's area",
+            Law::Motion => "the actuators' motion",
             Law::Head => "the head",
             Law::Housing => "the housing's heat",
-            Law::InletTemperature => "T1 against Tc",
-            Law::Efficiency => "the efficiency",
-            Law::Rest => "the rest",
+            Law::InletTemperature => "T1 while Tc changes",
+            Law::Efficiency => "the efficiency over the map",
+            Law::Rest => "the readings at rest",
             Law::Convection => "the convection",
             Law::Conditions => "the conditions",
         }
@@ -183,9 +183,7 @@ impl fmt::Display for Suspect {
         match self {
             Suspect::Sensor(fault) => fault.fmt(f),
             Suspect::Machine(machine) => f.write_str(&machine_name(*machine)),
-            Suspect::Unmodelled(law) => {
-                write!(f, "none of these: {} has errors beyond those declared", law.name())
-            }
+            Suspect::Unmodelled(law) => write!(f, "error of {} (none of these)", law.name()),
         }
     }
 }

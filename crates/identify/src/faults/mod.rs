@@ -168,11 +168,11 @@ pub(crate) fn find(hypotheses: &Hypotheses, method: Method, standstills: &[Stand
     if odds > 1.0 && !replaced.is_empty() {
         let is_possible = |limit: f64| odds.recip() > limit;
         let touched = is_possible(MIN_WEIGHT) && replaced.iter().any(|fault| fault.touches_points);
-        let (value, sigma) = unmodelled.error_ratio;
+        let (ratio, sigma) = unmodelled.error_ratio;
         let alternatives = replaced.iter().map(|fault| fault.suspect).filter(|_| is_possible(EXCLUDED_ODDS));
         let none = FoundFault {
             suspect: none,
-            value,
+            value: ratio - 1.0,
             sigma,
             alternatives: alternatives.collect(),
             touches_points: touches_points(none, method) || touched,

@@ -20,6 +20,8 @@ pub struct MapDrawing {
     pub choke: Vec<(f64, f64)>,
     /// Measured surge-side ends with their 95 % intervals.
     pub sought: Vec<ScatterPoint>,
+    /// Soft surge: corrected flow, pressure ratio.
+    pub soft: Vec<(f64, f64)>,
 }
 
 /// A speed line.
@@ -62,9 +64,17 @@ impl MapDrawing {
     /// The fitted lines, or curves through the points.
     pub fn new(map: &CompressorMap) -> Self {
         let sought = map.surge.iter().map(surge_mark).collect();
+        let soft = map.surge.iter().filter_map(|mark| mark.soft);
+        let soft = soft.map(|soft| (soft.flow_corrected_kg_s, soft.pressure_ratio)).collect();
         let Some(fitted) = &map.fitted else {
             let lines = map.lines.iter().map(|line| measured_line(map, line)).collect();
-            return MapDrawing { lines, surface: efficiency_surface(map), sought, ..MapDrawing::default() };
+            return MapDrawing {
+                lines,
+                surface: efficiency_surface(map),
+                sought,
+                soft,
+                ..MapDrawing::default()
+            };
         };
         let mut own_points = map.lines.iter();
         let lines = fitted.lines.iter().map(|line| LineDrawing {
@@ -86,6 +96,7 @@ impl MapDrawing {
             surge: fitted.surge_line().map(|(_, node)| place(node)).collect(),
             choke: fitted.choke_line().map(|(_, node)| place(node)).collect(),
             sought,
+            soft,
         }
     }
 

@@ -72,8 +72,8 @@ pub use measurement::plausible::{
     check_running, is_plausible_range, is_possible, is_reading, measurable, plausible, repeats,
 };
 pub use measurement::recording::{
-    ChannelColumn, ElementColumn, Event, EventKind, Provenance, Quality, ReadingOrigin, Recording,
-    RecordingError, SampleBatch, Series, StepMarker, TruthColumn,
+    ChannelColumn, ElementColumn, Event, EventKind, FastSamples, Provenance, Quality, ReadingOrigin,
+    Recording, RecordingError, SampleBatch, Series, StepMarker, TruthColumn,
 };
 pub use measurement::redundant::{DeclaredElement, Element, MAX_ELEMENTS, RedundantSensors, UnknownElement};
 pub use rig::actuators::{ActuatorMotion, RigActuators};
@@ -87,7 +87,7 @@ pub use rig::guard::{
     SurgeVariation, Trip,
 };
 pub use rig::limits::{Limits, OnDrift, SURGE_ALLOWED_S, Soak, SpeedControlSettings, SpeedResponse};
-pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeNotFound, SurgeSearchSettings};
+pub use rig::surge::{SoftSurge, SurgeFoundBy, SurgeMark, SurgeNotFound, SurgeSearchSettings};
 pub use test_plan::plan::{
     Advice, CampaignChange, Plan, PlanFigures, PlanInputHashes, PlanRemark, PlanStep, Predicted, Ramp, Ramps,
     StepKind, Transition, UndeclaredForecast, VerdictForecast,

@@ -5,7 +5,7 @@ use crate::protocol::{
     Encoding, FRAME_LIMIT_BYTES, FrameError, InvalidData, Message, RENEW_S, decode, encode, read_frame,
     write_frame,
 };
-use mapper_core::{BackendError, Channel, ChannelColumn, Event, EventKind, SampleBatch};
+use mapper_core::{BackendError, Channel, ChannelColumn, Event, EventKind, FastSamples, SampleBatch};
 use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::path::Path;
@@ -287,6 +287,7 @@ const MAX_NOTES: usize = 100;
 pub(crate) struct SampleQueue {
     batches: VecDeque<SampleBatch>,
     events: Vec<Event>,
+    fast: Vec<FastSamples>,
     expected: u64,
     next: u64,
     last_s: Option<f64>,
@@ -307,6 +308,12 @@ impl SampleQueue {
         if self.events.len() > MAX_EVENTS || self.values + text / 8 > MAX_VALUES {
             return Err(InvalidData::TooMany);
         }
+        let fast: usize = batch.fast.iter().map(|fast| fast.values.len()).sum();
+        self.values += fast;
+        if self.values > MAX_VALUES {
+            return Err(InvalidData::TooMany);
+        }
+        self.fast.append(&mut batch.fast);
         let Some(first_s) = batch.t_s.first().copied() else { return Ok(()) };
         if batch.first_sequence != self.expected {
             return Err(InvalidData::Sequence { expected: self.expected, found: batch.first_sequence });
@@ -371,6 +378,8 @@ impl SampleQueue {
         let (now, later) =
             std::mem::take(&mut self.events).into_iter().partition(|e: &Event| e.t_s <= until_s);
         (merged.events, self.events) = (now, later);
+        merged.fast = std::mem::take(&mut self.fast);
+        self.values -= merged.fast.iter().map(|fast| fast.values.len()).sum::<usize>().min(self.values);
         merged
     }
 }

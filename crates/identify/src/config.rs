@@ -3,7 +3,7 @@
 use crate::step_outcome::error::IdentifyError;
 use mapper_core::{
     Channel, InletConvection, JointSettings, Method, ModelTolerances, Recording, ReferenceState,
-    ResultRemark, SettleBands, WindowRule,
+    ResultRemark, RigActuators, SettleBands, WindowRule,
 };
 pub use mapper_core::{DeclaredUncertainty, NoiseColour};
 use mapper_numerics::coloured_noise::ColouredNoise;
@@ -88,8 +88,9 @@ pub struct IdentifyConfig {
     pub humidity_sigma_kg_kg: f64,
     /// Readings of an isothermal zero: gain errors count from there.
     pub exact_at: ExactReadings,
-    /// Declared play of the back-pressure valve, opening.
-    pub valve_play_ratio: f64,
+    /// Declared actuators; `None`: their motion is not judged.
+    #[serde(default)]
+    pub actuators: Option<RigActuators>,
     /// Whether openings are areas relative to the nominal one, as in the program's own recordings; otherwise any number of a stand.
     pub opening_is_area: bool,
     /// Error that all absolute pressures share, one standard deviation, Pa: of the barometer to which gauge pressures are added, and what an
@@ -146,7 +147,7 @@ impl Default for IdentifyConfig {
             shaft_inertia_kgm2: Params::default().shaft_inertia_kgm2,
             humidity_sigma_kg_kg: 0.0,
             exact_at: ExactReadings::default(),
-            valve_play_ratio: 0.0,
+            actuators: None,
             opening_is_area: false,
             barometer_sigma_pa: 0.0,
             barometer_pa: None,
@@ -193,6 +194,11 @@ impl IdentifyConfig {
             Some((name, value, _, expected)) => Err(IdentifyError::Config { name, value, expected }),
             None => Ok(()),
         }
+    }
+
+    /// Declared play of the back-pressure valve, opening.
+    pub(crate) fn valve_play_ratio(&self) -> f64 {
+        self.actuators.map_or(0.0, |actuators| actuators.valve_play_ratio)
     }
 
     /// Corrected flow, kg/s: the flow of dry air in the reference state at the same Mach numbers.

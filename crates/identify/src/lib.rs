@@ -39,7 +39,7 @@ pub use config::{
     method_for, needs,
 };
 pub use faults::end_readings::MAX_CORRELATED_ROWS;
-pub use faults::found_fault::{FoundFault, Machine, Suspect};
+pub use faults::found_fault::{FoundFault, Law, Machine, Suspect};
 pub use faults::nominal_rig::NominalRig;
 pub use faults::valve_check::{ValveCheck, ValveState};
 pub use identify::{Identified, identify, identify_each, identify_recording};

@@ -7,7 +7,7 @@
 #![allow(clippy::print_stdout, reason = "the table is what a person looks at who changes a balance")]
 
 use crate::lab::{Machine as LabMachine, campaign, eighteen, measured};
-use mapper_core::{Channel, FaultKind, Method, ModelTolerances, Recording, Verdict};
+use mapper_core::{Channel, FaultKind, Method, ModelTolerances, Recording, RigActuators, Verdict};
 use mapper_identify::{
     Identified, IdentifyConfig, Machine, NominalRig, Suspect, blade_count, identify_recording,
 };
@@ -145,7 +145,7 @@ fn a_valve_with_play_is_named_and_leaves_the_points_as_they_are() {
         assert_eq!(fault.suspect, Suspect::Machine(Machine::ValvePlay));
         assert!((fault.value - PLAY).abs() < 3.0 * fault.sigma, "{fault:?}");
         assert_eq!(good(&with_play), good_as_commanded);
-        drawn.config.valve_play_ratio = PLAY;
+        drawn.config.actuators = Some(RigActuators { valve_play_ratio: PLAY, ..RigActuators::FAST_VALVE });
         assert!(found(&drawn, &drawn.recording).faults.is_empty());
     }
 }

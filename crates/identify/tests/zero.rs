@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::lab::{Machine, campaign, eighteen, measured};
-use mapper_core::{Channel, DeclaredUncertainty, Method, Recording, Series, Verdict};
+use mapper_core::{Channel, DeclaredUncertainty, Event, EventKind, Method, Recording, Series, Verdict};
 use mapper_identify::{
     IdentifyConfig, NoZero, NotZeroed, Suspect, ZeroSettings, expected_after_zero, identify,
     identify_recording, isothermal_zero, zeroed,
@@ -134,6 +134,20 @@ fn with_rest_behind(recording: &Recording, soak_s: f64) -> Recording {
     }
     rested.steps.clone_from(&recording.steps);
     rested
+}
+
+/// The offsets of a zero that a script makes after the steps apply to the run, those of a rest without a zero do not.
+#[test]
+fn a_zero_between_steps_counts_like_one_before_them() {
+    let clean = campaign(&eighteen()[..2], 120.0, Machine::default());
+    let mut rested = with_rest_behind(&clean.recording, 900.0);
+    shift(&mut rested, Channel::T2, |_| 0.3);
+    let zero = |recording: &Recording| isothermal_zero(recording, &usual(), &ZeroSettings::default());
+    assert!(matches!(zero(&rested), Err(NoZero::NoSoak { .. })));
+    let t_s = *rested.series[&Channel::T1].t_s.last().unwrap();
+    rested.events.push(Event { t_s, kind: EventKind::SoakEnded, message: String::new() });
+    let found = zero(&rested).unwrap();
+    assert!((found.offsets[&Channel::T2] - found.offsets[&Channel::T1] - 0.3).abs() < 1e-9, "{found:?}");
 }
 
 /// Five sensors next to a barometer, a cell's thermometer and cold oil: one that is ten of its declared offsets off at rest is named, before the

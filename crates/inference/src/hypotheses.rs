@@ -22,6 +22,12 @@ const CERTAIN_SIGMAS: f64 = 1e6;
 /// with more than three causes at once are not expected.
 pub const MAX_MEMBERS: usize = 4;
 
+/// Errors of a balance over the declared ones, where a cause acts that is none of the hypotheses. Bound: below two, declared errors are as
+/// probable; above the last, every size is as improbable.
+const ERROR_RATIOS: [f64; 9] = [2.0, 2.8, 4.0, 5.7, 8.0, 11.0, 16.0, 23.0, 32.0];
+/// Resolution of such a ratio, relative. Bound: the distance of two of them, as the standard deviation of a rectangular distribution.
+const RATIO_RESOLUTION: f64 = 0.1;
+
 /// Residuals and their sensitivities to the parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Balance {
@@ -38,6 +44,11 @@ pub struct Balance {
 pub struct Likelihood {
     precision: DMatrix<f64>,
     precision_mean: DVector<f64>,
+    /// Square of the residuals in their standard errors.
+    square: f64,
+    rows: usize,
+    /// ln of the factor by which larger errors than declared reduce the density of the residuals.
+    ln_width: f64,
 }
 
 /// A parameter that is zero unless it is a member of the explanation.
@@ -115,18 +126,28 @@ pub struct Explanation {
     pub alone: BTreeMap<usize, f64>,
 }
 
+/// An explanation in which one balance has larger errors than declared, by a cause that is none of the hypotheses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unmodelled {
+    /// Position of the balance.
+    pub balance: usize,
+    /// Its errors over the declared ones: mean and standard deviation.
+    pub error_ratio: (f64, f64),
+    /// ln of the odds of this explanation against the best one without.
+    pub ln_odds: f64,
+    /// The other members.
+    pub explanation: Explanation,
+}
+
 impl Likelihood {
     /// An uninformative likelihood of `parameters` parameters: no balance has been added.
     pub fn new(parameters: usize) -> Self {
-        Likelihood {
-            precision: DMatrix::zeros(parameters, parameters),
-            precision_mean: DVector::zeros(parameters),
-        }
+        Likelihood::of(DMatrix::zeros(parameters, parameters), DVector::zeros(parameters))
     }
 
     /// A likelihood of hypotheses alone, from `C' S^-1 C` and `C' S^-1 r`; `S` includes the parameters that always differ from zero.
     pub fn of(precision: DMatrix<f64>, precision_mean: DVector<f64>) -> Self {
-        Likelihood { precision, precision_mean }
+        Likelihood { precision, precision_mean, square: 0.0, rows: 0, ln_width: 0.0 }
     }
 
     /// Adds a balance with independent errors. `None` if its covariance is not positive definite, a number is not finite or shapes differ.
@@ -145,7 +166,86 @@ impl Likelihood {
         let residual = lower.solve_lower_triangular(residual)?;
         self.precision += columns.tr_mul(&columns);
         self.precision_mean += columns.tr_mul(&residual);
+        (self.square, self.rows) = (self.square + residual.norm_squared(), self.rows + rows);
         Some(())
+    }
+
+    /// The likelihood of all these balances together, that of one of them with errors larger by a factor; `None` without any.
+    pub fn together<'a>(
+        balances: impl IntoIterator<Item = &'a Likelihood>,
+        larger: Option<(usize, f64)>,
+    ) -> Option<Likelihood> {
+        let mut sum: Option<Likelihood> = None;
+        for (index, balance) in balances.into_iter().enumerate() {
+            let ratio = larger.filter(|(of, _)| *of == index).map_or(1.0, |(_, ratio)| ratio);
+            let weight = (ratio * ratio).recip();
+            let sum = sum.get_or_insert_with(|| Likelihood::new(balance.precision_mean.len()));
+            sum.precision += weight * &balance.precision;
+            sum.precision_mean += weight * &balance.precision_mean;
+            sum.square += weight * balance.square;
+            sum.ln_width += balance.rows as f64 * ratio.ln();
+            sum.rows += balance.rows;
+        }
+        sum
+    }
+
+    /// ln of the density of the residuals without any hypothesis, up to a constant.
+    fn ln_density(&self, always: &[f64]) -> Option<f64> {
+        let first = always.len();
+        let scale = DMatrix::from_diagonal(&DVector::from_column_slice(always));
+        let own = &scale * self.precision.view((0, 0), (first, first)) * &scale;
+        let factor = (DMatrix::identity(first, first) + own).cholesky()?;
+        let mean = &scale * self.precision_mean.rows(0, first);
+        let ln_root_determinant: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+        Some(0.5 * (mean.dot(&factor.solve(&mean)) - self.square) - ln_root_determinant - self.ln_width)
+    }
+
+    /// The most probable explanation in which one of `balances` has larger errors than declared, by a cause that is none of the hypotheses
+    /// and as probable as `ln_prior` before; `known` is the best explanation without.
+    pub fn explain_unmodelled(
+        balances: &[&Likelihood],
+        priors: &Priors,
+        known: &Explanation,
+        ln_prior: f64,
+    ) -> Option<Unmodelled> {
+        let ln_each = ln_prior - ((balances.len() * ERROR_RATIOS.len()) as f64).ln();
+        let mut best: Option<(f64, usize, Vec<f64>)> = None;
+        for index in 0..balances.len() {
+            let mut ln_totals = Vec::new();
+            for ratio in ERROR_RATIOS {
+                let with = Likelihood::together(balances.iter().copied(), Some((index, ratio)))?;
+                let marginal = with.marginalise(&priors.always)?;
+                let singles =
+                    SetSearch { likelihood: &marginal, hypotheses: &priors.hypotheses }.extensions(&[]);
+                let single = singles.values().map(|single| single.ln_total).fold(0.0, f64::max);
+                ln_totals.push(with.ln_density(&priors.always)? + single);
+            }
+            let ln_total = ln_totals.iter().copied().fold(f64::NEG_INFINITY, ln_sum);
+            if best.as_ref().is_none_or(|best| ln_total > best.0) {
+                best = Some((ln_total, index, ln_totals));
+            }
+        }
+        let (ln_total, balance, ln_totals) = best?;
+        let weights: Vec<f64> = ln_totals.iter().map(|ln| (ln - ln_total).exp()).collect();
+        let moment = |of: &dyn Fn(f64) -> f64| {
+            weights.iter().zip(ERROR_RATIOS).map(|(weight, ratio)| weight * of(ratio)).sum::<f64>()
+        };
+        let mean = moment(&|ratio| ratio);
+        let largest = (0..weights.len()).max_by(|a, b| weights[*a].total_cmp(&weights[*b]))?;
+        let with = Likelihood::together(balances.iter().copied(), Some((balance, ERROR_RATIOS[largest])))?;
+        let explanation = with.explain(priors)?;
+        let more = with.ln_density(&priors.always)? + explanation.ln_odds - ln_totals[largest];
+        let without =
+            Likelihood::together(balances.iter().copied(), None)?.ln_density(&priors.always)? + known.ln_odds;
+        Some(Unmodelled {
+            balance,
+            error_ratio: (
+                mean,
+                moment(&|ratio| (ratio - mean).powi(2)).sqrt().hypot(RATIO_RESOLUTION * mean),
+            ),
+            ln_odds: ln_total + more + ln_each - without,
+            explanation,
+        })
     }
 
     /// Marginal likelihood of the hypotheses: integrates over the first parameters, which have standard deviations `always`.
@@ -160,11 +260,10 @@ impl Likelihood {
         let precision_mean = &scale * self.precision_mean.rows(0, first);
         let factor = (DMatrix::identity(first, first) + &scale * own * &scale).cholesky()?;
         let rest = self.precision.view((first, first), (count - first, count - first));
-        Some(Likelihood {
-            precision: rest - shared.tr_mul(&factor.solve(&shared)),
-            precision_mean: self.precision_mean.rows(first, count - first)
-                - shared.tr_mul(&factor.solve(&precision_mean)),
-        })
+        Some(Likelihood::of(
+            rest - shared.tr_mul(&factor.solve(&shared)),
+            self.precision_mean.rows(first, count - first) - shared.tr_mul(&factor.solve(&precision_mean)),
+        ))
     }
 
     /// The Cholesky factor of the scaled posterior precision `1 + D H D` of some parameters, and their scaled precision_mean.
@@ -187,7 +286,7 @@ impl Likelihood {
 
     /// Every hypothesis as the only member of the explanation; `None` if the covariance of the declared parameters is singular.
     pub fn singles(&self, priors: &Priors) -> Option<Vec<Single>> {
-        let Likelihood { precision, precision_mean } = self.marginalise(&priors.always)?;
+        let Likelihood { precision, precision_mean, .. } = self.marginalise(&priors.always)?;
         let single = |(index, hypothesis): (usize, &Hypothesis)| {
             let precision_mean = precision_mean[index];
             let scaled = 1.0 + hypothesis.sigma.powi(2) * precision[(index, index)];
@@ -551,6 +650,50 @@ mod tests {
             assert!(found.ln_odds > best - 2.0 * 2.0_f64.ln(), "{} below {best}", found.ln_odds);
             assert!(found.members.iter().all(|member| member.index != 5 || member.value >= 0.0));
         }
+    }
+
+    /// Two balances that a fault explains, and two of which one has five times its errors: the fault alone is the answer, or that balance.
+    #[test]
+    fn errors_of_unknown_cause_are_told_from_a_hypothesis() {
+        use rand::SeedableRng;
+        use rand_distr::{Distribution, StandardNormal};
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
+        let all = columns(30, 6);
+        let priors = Priors::even(vec![0.3; 2], &[2.0; 4], 0.1);
+        let parts = 200;
+        let [mut wrong, mut missed] = [0, 0];
+        for part in 0..parts {
+            let is_fault = part % 2 == 0;
+            let fault = if is_fault { 8.0 / all.column(3).norm() } else { 0.0 };
+            let likelihood = |ratio: f64, rng: &mut rand_pcg::Pcg64| {
+                let noise = DVector::from_fn(30, |_, _| {
+                    let normal: f64 = StandardNormal.sample(rng);
+                    ratio * normal
+                });
+                let residual = noise + fault * all.column(3);
+                let covariance = DMatrix::identity(30, 30);
+                let mut likelihood = Likelihood::new(6);
+                likelihood.add(&Balance { residual, covariance, columns: all.clone() }).unwrap();
+                likelihood
+            };
+            let each = [likelihood(1.0, &mut rng), likelihood(if is_fault { 1.0 } else { 5.0 }, &mut rng)];
+            let known = Likelihood::together(&each, None).unwrap().explain(&priors).unwrap();
+            let each: Vec<&Likelihood> = each.iter().collect();
+            let none = Likelihood::explain_unmodelled(&each, &priors, &known, (0.1_f64 / 4.0).ln()).unwrap();
+            let (ratio, sigma) = none.error_ratio;
+            if is_fault {
+                wrong += usize::from(none.ln_odds > 0.0);
+            } else {
+                let is_right = none.ln_odds > 0.0 && none.balance == 1 && none.explanation.members.is_empty();
+                missed += usize::from(!is_right || (ratio - 5.0).abs() > 4.0 * sigma);
+            }
+        }
+        assert_eq!((wrong, missed), (0, 0), "of {parts}");
+        // Without always-present parameters the density is that of a scaled normal distribution.
+        let balance = Likelihood { square: 40.0, rows: 30, ..Likelihood::new(1) };
+        let scaled = Likelihood::together([&balance], Some((0, 2.0))).unwrap();
+        let density = scaled.ln_density(&[]).unwrap() - balance.ln_density(&[]).unwrap();
+        assert!((density - (15.0 - 30.0 * 2.0_f64.ln())).abs() < 1e-12, "{density}");
     }
 
     #[test]

@@ -38,6 +38,8 @@ pub(crate) const STEP_TOPIC: &str = "/step";
 pub(crate) const EVENT_TOPIC: &str = "/event";
 /// Topic of the single sensors of channels that have several.
 pub(crate) const ELEMENTS_TOPIC: &str = "/rig/elements";
+/// Topic of fast samples, in windows.
+pub(crate) const FAST_TOPIC: &str = "/rig/fast";
 /// Topic of readings with an unusual quality or source time.
 pub(crate) const PROVENANCE_TOPIC: &str = "/rig/provenance";
 pub(crate) const TRUTH_TOPIC: &str = "/truth/model";
@@ -88,6 +90,17 @@ impl Topic {
     pub(crate) fn of_events() -> Topic {
         let (schema, units) = event_schema();
         Topic { name: EVENT_TOPIC, schema, units }
+    }
+
+    pub(crate) fn of_fast_samples() -> Topic {
+        let properties = json!({
+            "channel": {"type": "string", "description": "symbol of the channel"},
+            "first_s": {"type": "number", "description": "run time of the first value", "unit": "s"},
+            "interval_s": {"type": "number", "description": "time from value to value", "unit": "s"},
+            "values": {"type": "array", "items": {"type": "number"}, "description": "readings in the channel's unit"},
+        });
+        let units = ["first_s", "interval_s"].map(|name| (name.to_owned(), "s".to_owned()));
+        Topic { name: FAST_TOPIC, schema: typed("fast", properties), units: units.into() }
     }
 
     pub(crate) fn of_provenance() -> Topic {

@@ -51,6 +51,8 @@ pub struct RecordingWriter {
     steps_written: u32,
     events_written: u32,
     layouts: Vec<TopicLayout>,
+    /// Topic of fast samples, once there are any: other recordings stay unchanged.
+    fast_channel: Option<u16>,
     line: Vec<u8>,
     /// Fields without a reading are not written at all.
     omit_absent: bool,
@@ -93,6 +95,7 @@ impl RecordingWriter {
             steps_written: 0,
             events_written: 0,
             layouts: Vec::new(),
+            fast_channel: None,
             line: Vec::with_capacity(512),
             omit_absent: false,
             provenance: ProvenanceWriter::default(),
@@ -153,7 +156,22 @@ impl RecordingWriter {
             }
             self.last_sample_s = Some(*t_s);
         }
-        events.try_for_each(|event| self.write_event(event))
+        events.try_for_each(|event| self.write_event(event))?;
+        for fast in &batch.fast {
+            let channel_id = match self.fast_channel {
+                Some(channel_id) => channel_id,
+                None => {
+                    let added = add_channel(&mut self.mcap, &Topic::of_fast_samples());
+                    let channel_id = self.check_write(added)?;
+                    self.fast_channel = Some(channel_id);
+                    channel_id
+                }
+            };
+            let log_time = self.log_time_ns(self.last_sample_s.unwrap_or(fast.first_s))?;
+            let message = serde_json::to_value(fast).unwrap_or_default();
+            self.write_json(channel_id, batch.first_sequence as u32, log_time, &message)?;
+        }
+        Ok(())
     }
 
     /// Writes one event.

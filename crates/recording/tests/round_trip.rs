@@ -214,9 +214,8 @@ prop_compose! {
             t_s: steps_ms.iter().map(|step_ms| { t_ms += step_ms; f64::from(t_ms) / 1e3 }).collect(),
             columns: picked.iter().zip(columns).map(|(c, values)| ChannelColumn { channel: CHANNELS[*c].channel, values }).collect(),
             elements: several.iter().zip(&readings).map(|(number, values)| ElementColumn { element: Element { channel: Channel::T2, number: *number }, values: values.clone() }).collect(),
-            provenance: Vec::new(),
             truth: vec![TruthColumn { name: "a \"quoted\" name".to_owned(), unit: "K".to_owned(), values: truth }],
-            events: Vec::new(),
+            ..SampleBatch::default()
         }
     }
 }

@@ -63,6 +63,7 @@ function mapMarks() {
     for (const line of other.map.lines.filter(line => line.measured))
       for (const piece of runs(line.nodes, false)) path(piece, { stroke: d3.schemeTableau10[index % 10], strokeDasharray: "7 3", strokeWidth: 1.4 });
   });
+  path(page.map.soft, { stroke: style("--bad"), strokeDasharray: "1 4", strokeWidth: 2 });
   if (page.map.sought.length) {
     marks.push(Plot.ruleY(page.map.sought, { y: "pr", x1: d => d.flow - d.flow_half, x2: d => d.flow + d.flow_half, stroke: style("--bad") }));
     marks.push(Plot.dot(page.map.sought, { x: "flow", y: "pr", symbol: "square", fill: style("--bad"), r: 3.5 }));

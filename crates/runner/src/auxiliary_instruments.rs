@@ -105,7 +105,9 @@ impl RigWithInstruments {
         t_s.dedup();
         let instrument_channels =
             |channel: &Channel| self.sources.iter().any(|source| source.channels.contains(channel));
-        let mut merged = SampleBatch { first_sequence: self.next_sequence, ..SampleBatch::default() };
+        let fast = parts.iter_mut().flat_map(|part| std::mem::take(&mut part.fast));
+        let fast = rig.fast.iter().cloned().chain(fast).collect();
+        let mut merged = SampleBatch { first_sequence: self.next_sequence, fast, ..SampleBatch::default() };
         // Only the rig provides truth.
         merged.truth = resample_truth(&rig, &t_s);
         add_channels(&mut merged, rig, &t_s, &|channel| !instrument_channels(&channel));
@@ -140,6 +142,7 @@ impl Source {
             Ok(mut batch) => {
                 let offset_s = self.offset_s;
                 batch.t_s.iter_mut().for_each(|t_s| *t_s += offset_s);
+                batch.fast.iter_mut().for_each(|fast| fast.first_s += offset_s);
                 for from in &mut batch.provenance {
                     from.source_t_s.iter_mut().for_each(|t_s| *t_s += offset_s);
                 }
@@ -151,7 +154,8 @@ impl Source {
                 }
                 // Readings from before the start of the run are dropped.
                 let early_count = batch.t_s.partition_point(|t_s| *t_s < 0.0);
-                let batch = batch.split_off(early_count);
+                let fast = std::mem::take(&mut batch.fast);
+                let batch = SampleBatch { fast, ..batch.split_off(early_count) };
                 if is_valid(&batch, self.waiting.t_s.last().copied())
                     && self.waiting.t_s.len() + batch.t_s.len() <= MAX_WAITING
                 {

@@ -63,9 +63,9 @@ pub trait StepSource {
     /// The next step; `None` ends the run. Its index counts up from 0. Blocks unless [`is_ready`](Self::is_ready) returned true.
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError>;
 
-    /// Time without air before the latest step, s; none by default.
-    fn rest_s(&self) -> f64 {
-        self.inner().map_or(0.0, StepSource::rest_s)
+    /// The standstill before the latest step; none by default.
+    fn rest(&self) -> Option<Soak> {
+        self.inner()?.rest()
     }
 
     /// Called when the latest step starts with its jump, and again if a guard requests that the step is repeated. Does nothing by default.

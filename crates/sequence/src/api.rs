@@ -158,7 +158,14 @@ table! {
             let session = session.clone();
             engine.register_fn("rest", move |time: &str| {
                 let duration_s = parse_quantity(Kind::Duration, time)?;
-                lock(&session).rest(duration_s)
+                lock(&session).rest(duration_s, false)
+            });
+        };
+        "zero(time)", "Like `rest(time)`, with the oil at the temperature of the inlet air: an isothermal zero, whose offsets are subtracted from the whole run. The last zero of a run counts." => |engine, session| {
+            let session = session.clone();
+            engine.register_fn("zero", move |time: &str| {
+                let duration_s = parse_quantity(Kind::Duration, time)?;
+                lock(&session).rest(duration_s, true)
             });
         };
         "repeat(n)", "Repeats step `n` by the same jump, so that the two can be compared: goes to the start of the jump if necessary, and jumps again. Returns the result of the jump." => |engine, session| {

@@ -3,7 +3,7 @@
 use crate::error::throw;
 use crate::request::{NominalForecast, Refusal, SequenceRequest, StepPrediction};
 use crate::settle::{EndCondition, ScriptMessage, SequenceStep, SettleRule, StepResult};
-use mapper_core::{OperatingPoint, PlanStep, RigMode, Setpoints, StepKind};
+use mapper_core::{OperatingPoint, PlanStep, RigMode, Setpoints, Soak, StepKind};
 use mapper_physics::simulation::steady::SteadyState;
 use rhai::{EvalAltResult, Position};
 use std::ops::RangeInclusive;
@@ -33,8 +33,8 @@ pub(crate) struct Session {
     pub request: SequenceRequest,
     /// Dwell time of the following points, s.
     pub dwell_s: f64,
-    /// Time without air before the next step, s.
-    rest_s: f64,
+    /// Time without air before the next step, s, and whether it is a zero.
+    rest: (f64, bool),
     pub results: Vec<StepResult>,
     nominal: NominalForecast,
     checks: usize,
@@ -55,7 +55,7 @@ impl Session {
         Session {
             dwell_s: request.timing.dwell.fixed_or_usual_s(),
             request,
-            rest_s: 0.0,
+            rest: (0.0, false),
             results: Vec::new(),
             nominal: NominalForecast::new(),
             checks: 0,
@@ -80,7 +80,7 @@ impl Session {
 
     /// Run time at which the next step starts, s.
     pub fn now_s(&self) -> f64 {
-        self.results.last().map_or(self.request.timing.warm_up_s, |result| result.end_s) + self.rest_s
+        self.results.last().map_or(self.request.timing.warm_up_s, |result| result.end_s) + self.rest.0
     }
 
     pub fn note(&mut self, text: &str) {
@@ -203,7 +203,7 @@ impl Session {
             let refused = accepts.check(&setpoints);
             refused.map_err(|error| throw(error.to_string(), "stay within the range of the rig"))?;
         }
-        let rest_s = std::mem::take(&mut self.rest_s);
+        let (rest_s, is_zero) = std::mem::take(&mut self.rest);
         if rest_s > 0.0 {
             self.nominal.rest(&self.request, rest_s);
         }
@@ -227,7 +227,16 @@ impl Session {
             predicted,
         };
         let notes = std::mem::take(&mut self.notes);
-        let step = Box::new(SequenceStep { step, end, rest_s });
+        let boundary = &target.boundary;
+        let soak = Soak {
+            duration_s: rest_s,
+            until_settled: false,
+            oil_temperature_k: if is_zero { boundary.t1_k } else { boundary.oil_temperature_k },
+            temperature_sigma_k: if is_zero { Soak::TEMPERATURE_SIGMA_K } else { 0.0 },
+            pressure_sigma_pa: if is_zero { Soak::PRESSURE_SIGMA_PA } else { 0.0 },
+        };
+        let rest = (rest_s > 0.0).then_some(soak);
+        let step = Box::new(SequenceStep { step, end, rest });
         self.to_caller.send(ScriptMessage::Step(step, notes)).map_err(|_| stop_error())?;
         let result = self.wait()?.ok_or_else(stop_error)?;
         let duration_s = result.end_s - result.start_s;
@@ -245,18 +254,18 @@ impl Session {
         self.step(last.target, duration_s, EndCondition::Dwell)
     }
 
-    /// Puts a standstill before the next step.
-    pub fn rest(&mut self, duration_s: f64) -> Result<(), ScriptThrow> {
+    /// Puts a standstill before the next step, after which sensors are zeroed if it is a zero.
+    pub fn rest(&mut self, duration_s: f64, is_zero: bool) -> Result<(), ScriptThrow> {
         if self.results.is_empty() {
             let message = "the machine is at rest before the first step".into();
             return Err(throw(message, "use `zero: {soak: ...}` of the campaign, or jump to a point first"));
         }
-        if !(duration_s > 0.0 && self.rest_s + duration_s <= DWELL_LIMIT_S) {
+        if !(duration_s > 0.0 && self.rest.0 + duration_s <= DWELL_LIMIT_S) {
             let message =
                 format!("a rest may last more than 0 s and at most {DWELL_LIMIT_S} s, not {duration_s} s");
             return Err(throw(message, "give a time such as \"5 min\""));
         }
-        self.rest_s += duration_s;
+        self.rest = (self.rest.0 + duration_s, self.rest.1 || is_zero);
         Ok(())
     }
 

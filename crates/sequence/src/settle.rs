@@ -1,7 +1,9 @@
 //! A step that a script asks for, its result, and whether its point has settled, decided from the samples alone.
 
 use crate::error::ScriptError;
-use mapper_core::{Channel, IdentifiedPoint, OperatingPoint, PlanStep, SampleBatch, SettleBands, Verdict};
+use mapper_core::{
+    Channel, IdentifiedPoint, OperatingPoint, PlanStep, SampleBatch, SettleBands, Soak, Verdict,
+};
 use mapper_numerics::statistics::median;
 use mapper_physics::operating_point::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 use std::collections::{BTreeMap, VecDeque};
@@ -22,8 +24,8 @@ pub struct SequenceStep {
     pub step: PlanStep,
     /// Condition for an earlier end.
     pub end: EndCondition,
-    /// Time without air before the step, s.
-    pub rest_s: f64,
+    /// Standstill before the step; with a non-uniformity if it is a zero.
+    pub rest: Option<Soak>,
 }
 
 /// A message from the script's thread, with the notes since the last one.

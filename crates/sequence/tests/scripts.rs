@@ -105,7 +105,8 @@ fn a_rest_has_no_jump_after_it_and_a_wait_has_none_at_all() {
     let script = "let p = grid()[0]; jump(p, \"60 s\"); rest(\"5 min\"); rest(\"5 min\"); jump(p, \"60 s\"); hold(\"30 s\");";
     let steps = steps_of(script);
     let [first, restarted, waited] = steps.as_slice() else { panic!("{steps:?}") };
-    assert_eq!((first.rest_s, restarted.rest_s, waited.rest_s), (0.0, 600.0, 0.0));
+    let rests_s = [first, restarted, waited].map(|step| step.rest.map_or(0.0, |rest| rest.duration_s));
+    assert_eq!(rests_s, [0.0, 600.0, 0.0]);
     let end_s = first.step.start_s + first.step.dwell_s;
     assert!((restarted.step.start_s - end_s - 600.0).abs() < 1e-9);
     assert!(restarted.step.from.is_none() && restarted.step.transition.is_none());

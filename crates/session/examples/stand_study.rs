@@ -4,11 +4,13 @@
 //! cargo run --release --locked -p mapper-session --example stand_study -- FILE NAME 'OLD=>NEW' ...
 //! ```
 //!
-//! Each `OLD=>NEW` replaces a part of the campaign file. With `forecast` in place of a file's replacement, only the plan is made.
+//! Each `OLD=>NEW` replaces a part of the campaign file. With `plan` in place of a replacement, only the plan is made. With `recordings` in place of
+//! FILE, the others are recordings, and a line of JSON states the highest speed, overshoot, surges and duration of each: `benches/stands.py`.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
-use mapper_core::{Channel, Event, EventKind, OperatingPoint, Plan, SampleBatch, StepMarker};
+use mapper_core::{Channel, Event, EventKind, OperatingPoint, Plan, Recording, SampleBatch, StepMarker};
+use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_runner::{ObserverError, PlanSteps, RunObserver};
 use mapper_session::{Registry, drive, nominal_model, plan};
 use std::path::Path;
@@ -110,8 +112,32 @@ fn describe(plan: &Plan) -> String {
     )
 }
 
+/// Of a recording: highest speed, rpm, largest overshoot over the higher target of a jump, number of surges and duration, s.
+fn describe_recording(file: &str) -> String {
+    let options = ReadOptions::default();
+    let Recording { series, steps, events, .. } =
+        read_recording(Path::new(file), &ChannelMap::native(), &options).unwrap().recording;
+    let highest_rpm = |start_s: f64, end_s: f64| {
+        series[&Channel::ShaftSpeed].slice(start_s, end_s).1.iter().copied().fold(0.0, f64::max)
+    };
+    let overshoot = |step: &StepMarker| {
+        let rpm = |point: Option<OperatingPoint>| point.map_or(0.0, |point| point.speed_rpm);
+        highest_rpm(step.start_s, step.end_s) / rpm(step.from).max(rpm(step.to)) - 1.0
+    };
+    let surges = events.iter().filter(|event| event.kind == EventKind::SurgeEntered).count();
+    let run_s = steps.last().map_or(0.0, |last| last.end_s - steps[0].start_s);
+    format!(
+        "{{\"highest_rpm\": {}, \"overshoot_ratio\": {}, \"surges\": {surges}, \"steps_s\": {run_s}}}",
+        highest_rpm(0.0, f64::MAX),
+        steps.iter().map(overshoot).fold(0.0, f64::max)
+    )
+}
+
 fn main() {
-    let mut arguments = std::env::args().skip(1);
+    let mut arguments = std::env::args().skip(1).peekable();
+    if arguments.next_if_eq("recordings").is_some() {
+        return arguments.for_each(|file| println!("{}", describe_recording(&file)));
+    }
     let (file, name) = (arguments.next().unwrap(), arguments.next().unwrap());
     let mut text = std::fs::read_to_string(&file).unwrap();
     let (mut only_plan, mut is_loud, mut traces) = (false, false, false);

@@ -226,9 +226,8 @@ impl Backend for ReplayBackend {
                     values: column.values[start..end].to_vec(),
                 })
                 .collect(),
-            provenance: Vec::new(),
-            truth: Vec::new(),
             events,
+            ..SampleBatch::default()
         })
     }
 

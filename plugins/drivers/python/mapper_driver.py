@@ -64,8 +64,8 @@ class Rig:
         """Hold the last setpoints while an operator checks the rig. Nothing to do if the rig keeps them by itself."""
 
     def poll(self, until_s):
-        """Samples since the last poll, up to until_s: (times, {channel: values}, [(t_s, kind, message)]). In real time it is called at
-        the rate of the rig, for the newest sample."""
+        """Samples since the last poll, up to until_s: (times, {channel: values}, [(t_s, kind, message)]), and fast samples of P1 and P2 if
+        there are any: [(channel, first_s, interval_s, values)]. In real time it is called at the rate of the rig, for the newest sample."""
         raise NotImplementedError
 
     def make_safe(self):
@@ -225,7 +225,11 @@ class Server:
 
     def measure(self, until_s):
         """Polls the rig and sends its samples in pieces."""
-        times, columns, events = self.rig.poll(until_s)
+        times, columns, events, *fast = self.rig.poll(until_s)
+        for channel, first_s, interval_s, values in fast[0] if fast else []:
+            samples = {"stream": "rig", "sequence": self.armed["sequence"], "t_s": [], "columns": []}
+            samples["fast"] = [{"channel": channel, "first_s": first_s, "interval_s": interval_s, "values": values}]
+            self.out.append({"method": "samples", "params": samples})
         for start in range(0, len(times), ROWS) if times else ([0] if events else []):
             end = start + ROWS
             last = end >= len(times)

@@ -52,6 +52,10 @@ fn map_panel(map: &CompressorMap, drawing: &MapDrawing, units: &MapUnits) -> Pan
         let marks = Scatter::new(drawing.sought.clone(), palette::VERMILLION);
         panel.add(marks.marker(Marker::Square).label("surge, sought"));
     }
+    if let Some(soft) = map.surge.iter().find_map(|mark| mark.soft) {
+        let label = format!("soft surge, {} variation {:.2} %", soft.channel, 100.0 * soft.variation_ratio);
+        panel.add(Line::new(drawing.soft.clone(), SURGE).width_px(1.2).dash(Dash::Dashed).label(label));
+    }
     let all = || map.lines.iter().flat_map(|line| &line.points);
     for class in CLASSES {
         let members: Vec<(f64, f64)> = all()

@@ -128,12 +128,23 @@ channels! {
     WaterFlow,        "m_water",       Turbine,    "water_flow_kg_s",             MassFlow,        "cooling water mass flow";
     RelativeHumidity, "RH",            Ambient,    "relative_humidity",           Ratio,           "relative humidity of the inlet air";
     DewPoint,         "T_dew",         Ambient,    "dew_point_k",                 Temperature,     "dew point of the inlet air";
+    P1Variation,      "P1_cov",        Compressor, "inlet_pressure_variation",    Ratio,           "coefficient of variation of P1 over a second of fast samples";
+    P2Variation,      "P2_cov",        Compressor, "outlet_pressure_variation",   Ratio,           "coefficient of variation of P2 over a second of fast samples";
 }
 
 /// Number of modelled channels, which are the first ones. The others are only measured. Source: the table above.
 pub const MODELLED_CHANNELS: usize = 19;
 
 impl Channel {
+    /// The channel of the coefficient of variation of its fast samples; `None` for channels that are not sampled fast.
+    pub fn variation(self) -> Option<Channel> {
+        match self {
+            Channel::P1 => Some(Channel::P1Variation),
+            Channel::P2 => Some(Channel::P2Variation),
+            _ => None,
+        }
+    }
+
     /// The channel's row in [`CHANNELS`].
     pub fn info(self) -> &'static ChannelInfo {
         &CHANNELS[self as usize]

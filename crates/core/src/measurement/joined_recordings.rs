@@ -152,6 +152,7 @@ impl SampleBatch {
         }
         self.t_s.extend(more.t_s);
         self.events.extend(more.events);
+        self.fast.extend(more.fast);
         for from in &mut self.provenance {
             // A sample without source time was taken when it arrived.
             let known = from.source_t_s.len().min(after);
@@ -164,7 +165,7 @@ impl SampleBatch {
         columns.chain(elements).chain(truth).for_each(|values| values.resize(after, f64::NAN));
     }
 
-    /// Splits off and returns the samples after the first `at`. The events stay.
+    /// Splits off and returns the samples after the first `at`. Events and fast samples stay.
     pub fn split_off(&mut self, at: usize) -> SampleBatch {
         fn cut<T>(values: &mut Vec<T>, at: usize) -> Vec<T> {
             values.split_off(at.min(values.len()))
@@ -201,6 +202,7 @@ impl SampleBatch {
                 })
                 .collect(),
             events: Vec::new(),
+            fast: Vec::new(),
         }
     }
 }

@@ -36,6 +36,8 @@ const RUNNING_LIQUID_K: RangeInclusive<f64> = 220.0..=480.0;
 const RUNNING_OPENING: RangeInclusive<f64> = 0.0..=10.0;
 /// Relative humidity. Bound: saturated air, with the error of a hygrometer.
 const RUNNING_HUMIDITY: RangeInclusive<f64> = 0.0..=1.05;
+/// Coefficient of variation of a pressure. Bound: deep surge swings by less than its mean.
+const RUNNING_VARIATION: RangeInclusive<f64> = 0.0..=1.0;
 /// Any single reading of a speed, rpm. Bound: spikes of a pulse counter.
 const ANY_RPM: RangeInclusive<f64> = 0.0..=1e7;
 /// Any single reading of a flow, kg/s. Bound: spikes and reversed flow.
@@ -73,6 +75,7 @@ pub fn plausible(channel: Channel) -> Plausible {
         }
         Channel::ValveCommand => RUNNING_OPENING,
         Channel::RelativeHumidity => RUNNING_HUMIDITY,
+        Channel::P1Variation | Channel::P2Variation => RUNNING_VARIATION,
     };
     let any = match channel.info().dimension {
         Dimension::RotationalSpeed => ANY_RPM,

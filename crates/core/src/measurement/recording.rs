@@ -193,6 +193,19 @@ pub struct TruthColumn {
     pub values: Vec<f64>,
 }
 
+/// Fast samples of a channel, evenly spaced: what its own column has every tenth of a second.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FastSamples {
+    /// The channel: one with a [`variation`](Channel::variation).
+    pub channel: Channel,
+    /// Time of the first since arming, s.
+    pub first_s: f64,
+    /// Interval, s, > 0.
+    pub interval_s: f64,
+    /// SI.
+    pub values: Vec<f64>,
+}
+
 /// All samples between two polls of a backend.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SampleBatch {
@@ -206,6 +219,9 @@ pub struct SampleBatch {
     /// Each sensor of channels with redundant sensors.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub elements: Vec<ElementColumn>,
+    /// Fast samples of pressures.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fast: Vec<FastSamples>,
     /// Channels with readings that are not good or arrived late; others have no entry.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub provenance: Vec<Provenance>,

@@ -1,6 +1,6 @@
 //! The search for surge: the approach to a line's surge-side end, and the resulting mark.
 
-use crate::{Recording, Series, StepKind};
+use crate::{Channel, Recording, Series, StepKind};
 use serde::{Deserialize, Serialize};
 
 /// Settings of the approach to surge at the end of a speed line: the valve closes in small steps until the surge flow is
@@ -79,6 +79,24 @@ pub struct SurgeMark {
     pub found_by: SurgeFoundBy,
     /// Number of openings in the approach.
     pub steps: usize,
+    /// Soft surge, if a pressure was sampled fast.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub soft: Option<SoftSurge>,
+}
+
+/// The onset of fluctuations before surge, as SAE J1826 (2022) describes it, with its criterion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SoftSurge {
+    /// The pressure that fluctuates.
+    pub channel: Channel,
+    /// Its coefficient of variation at soft surge: the criterion.
+    pub variation_ratio: f64,
+    /// The same far from surge.
+    pub quiet_ratio: f64,
+    /// Corrected flow, kg/s, at the speed of the mark.
+    pub flow_corrected_kg_s: f64,
+    /// Total pressure ratio.
+    pub pressure_ratio: f64,
 }
 
 /// A line on which surge was not found.
@@ -109,6 +127,7 @@ impl SurgeMark {
         ] {
             *flow *= flow_factor;
         }
+        self.soft.iter_mut().for_each(|soft| soft.flow_corrected_kg_s *= flow_factor);
     }
 }
 

@@ -2,8 +2,8 @@
 
 use crate::protocol::convert::InvalidData;
 use mapper_core::{
-    Channel, ChannelColumn, Element, ElementColumn, Event, EventKind, Provenance, Quality, SampleBatch,
-    TruthColumn,
+    Channel, ChannelColumn, Element, ElementColumn, Event, EventKind, FastSamples, Provenance, Quality,
+    SampleBatch, TruthColumn,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,6 +25,9 @@ pub struct Samples {
     /// Each sensor of the channels that have several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub elements: Vec<ElementSamples>,
+    /// Fast samples of P1 and P2, at 100 Hz or more.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fast: Vec<FastColumn>,
     /// True values of a simulator.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub truth: Vec<TruthSamples>,
@@ -53,6 +56,19 @@ pub struct Column {
 pub struct ElementSamples {
     /// Channel and number, e.g. `T2/3`.
     pub element: String,
+    /// SI; `null` without a reading.
+    pub values: Vec<Option<f64>>,
+}
+
+/// Fast samples of a channel, evenly spaced.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FastColumn {
+    /// Symbol of the channel: `P1` or `P2`.
+    pub channel: String,
+    /// Time of the first, s since arming.
+    pub first_s: f64,
+    /// Interval, s.
+    pub interval_s: f64,
     /// SI; `null` without a reading.
     pub values: Vec<Option<f64>>,
 }
@@ -153,6 +169,17 @@ pub fn batch(samples: Samples, described: &[Channel]) -> Result<SampleBatch, Inv
             values: values_or_nan(column.values),
         });
     }
+    let mut fast = Vec::new();
+    for column in samples.fast {
+        let FastColumn { channel, first_s, interval_s, values } = column;
+        if !(first_s.is_finite() && interval_s > 0.0 && interval_s.is_finite()) {
+            return Err(InvalidData::Time { before_s: first_s, t_s: first_s + interval_s });
+        }
+        let Ok(channel) = channel.parse::<Channel>() else { continue };
+        if channel.variation().is_some() {
+            fast.push(FastSamples { channel, first_s, interval_s, values: values_or_nan(values) });
+        }
+    }
     let kind =
         |word: String| serde_json::from_value(serde_json::Value::String(word)).unwrap_or(EventKind::Note);
     let event = |event: RigEvent| Event { t_s: event.t_s, kind: kind(event.kind), message: event.message };
@@ -164,6 +191,7 @@ pub fn batch(samples: Samples, described: &[Channel]) -> Result<SampleBatch, Inv
         provenance,
         truth,
         events: samples.events.into_iter().map(event).collect(),
+        fast,
     })
 }
 
@@ -178,8 +206,18 @@ pub fn split_batch(batch: &SampleBatch, frame_limit_bytes: u32) -> Vec<Samples> 
     if starts.is_empty() && !batch.events.is_empty() {
         starts.push(0);
     }
-    let mut pieces: Vec<Samples> =
-        starts.into_iter().map(|start| cut_batch(batch, start, count.min(start + max_samples))).collect();
+    let max_values = (frame_limit_bytes as usize / 2 / BYTES_PER_VALUE).max(1);
+    let fast = batch.fast.iter().flat_map(|fast| {
+        fast.values.chunks(max_values).enumerate().map(move |(index, values)| FastColumn {
+            channel: fast.channel.to_string(),
+            first_s: fast.first_s + (index * max_values) as f64 * fast.interval_s,
+            interval_s: fast.interval_s,
+            values: values.iter().map(|value| value.is_finite().then_some(*value)).collect(),
+        })
+    });
+    let alone = |fast| Samples { fast: vec![fast], ..cut_batch(batch, 0, 0) };
+    let of_times = starts.into_iter().map(|start| cut_batch(batch, start, count.min(start + max_samples)));
+    let mut pieces: Vec<Samples> = fast.map(alone).chain(of_times).collect();
     if let Some(last) = pieces.last_mut() {
         let kind = |kind: EventKind| serde_json::to_value(kind).ok()?.as_str().map(str::to_owned);
         let rig_event = |event: &Event| RigEvent {
@@ -241,6 +279,7 @@ fn cut_batch(batch: &SampleBatch, start: usize, end: usize) -> Samples {
             })
             .collect(),
         events: Vec::new(),
+        fast: Vec::new(),
     }
 }
 
@@ -266,10 +305,17 @@ mod tests {
                     quality: vec![Quality::Uncertain; t_s.len()],
                 }],
                 events: vec![Event { t_s: 1.0, kind: EventKind::RigTripped, message: "tripped".to_owned() }],
+                fast: vec![FastSamples {
+                    channel: Channel::P2,
+                    first_s: 0.5,
+                    interval_s: 1e-3,
+                    values: t_s.iter().map(|t_s| 1e5 + t_s).collect(),
+                }],
                 t_s,
                 ..SampleBatch::default()
             };
             let (mut next, mut values, mut sources) = (40, Vec::new(), Vec::new());
+            let mut fast = Vec::new();
             let sent = split_batch(&full, limit);
             prop_assert!(!sent.is_empty());
             for piece in sent {
@@ -283,6 +329,14 @@ mod tests {
                 }
                 let part = batch(piece, &[Channel::T2]).unwrap();
                 prop_assert_eq!(part.first_sequence, next);
+                for piece in part.fast {
+                    let after_s = 1e-3 * fast.len() as f64;
+                    prop_assert!((piece.first_s - 0.5 - after_s).abs() < 1e-9, "{piece:?}");
+                    fast.extend(piece.values);
+                }
+                if part.t_s.is_empty() {
+                    continue;
+                }
                 next += part.t_s.len() as u64;
                 values.extend(part.columns[0].values.iter().map(|value| value.to_bits()));
                 sources.extend(part.provenance[0].source_t_s.clone());
@@ -290,6 +344,7 @@ mod tests {
             }
             prop_assert_eq!(values, column.iter().map(|value| value.to_bits()).collect::<Vec<_>>());
             prop_assert_eq!(sources, full.t_s);
+            prop_assert_eq!(&fast, &full.fast.first().map(|fast| fast.values.clone()).unwrap_or_default());
         }
     }
 

@@ -73,6 +73,7 @@ impl Rows {
         let barometer = self.column(|channel, _| f64::from(u8::from(pressure(channel))));
         let by_suspect = suspects.iter().map(|suspect| match suspect {
             Suspect::Sensor(fault) => self.by_fault(fault),
+            Suspect::Unmodelled(_) => DVector::zeros(self.residual.len()),
             Suspect::Machine(machine) => {
                 let own = self.by_machine.iter().find(|(own, _)| own == machine);
                 own.map_or_else(

@@ -12,6 +12,47 @@ pub enum Suspect {
     Sensor(SensorFault),
     /// The machine is not as declared, ratio.
     Machine(Machine),
+    /// None of the others: errors of a balance beyond the declared ones, ratio.
+    Unmodelled(Law),
+}
+
+/// The balances of the check.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Law {
+    /// One opening has one area.
+    Valve,
+    /// P3 and valve follow their commands.
+    Motion,
+    /// Heads go with the speed squared.
+    Head,
+    /// The housing stores the heat of the gas.
+    Housing,
+    /// T1 does not follow Tc.
+    InletTemperature,
+    /// Efficiency is a smooth function of the map position.
+    Efficiency,
+    /// Sensors at rest read the same.
+    Rest,
+    /// h follows a law.
+    Convection,
+    /// Conditions are as declared.
+    Conditions,
+}
+
+impl Law {
+    fn name(self) -> &'static str {
+        match self {
+            Law::Valve => "the valve's area",
+            Law::Motion => "the actuators' motion",
+            Law::Head => "the head",
+            Law::Housing => "the housing's heat",
+            Law::InletTemperature => "T1 while Tc changes",
+            Law::Efficiency => "the efficiency over the map",
+            Law::Rest => "the readings at rest",
+            Law::Convection => "the convection",
+            Law::Conditions => "the conditions",
+        }
+    }
 }
 
 /// Machine properties that may differ from the declaration.
@@ -25,6 +66,10 @@ pub enum Machine {
     ValveArea,
     /// Play of its drive beyond the declared one, opening.
     ValvePlay,
+    /// Delay of the turbine inlet pressure beyond the declared one, s.
+    SlowAir,
+    /// The same of the back-pressure valve.
+    SlowValve,
     /// Share of its commands that the valve does not follow in a series of steps, by their indices; 1 stands still at this opening.
     ValveStuck {
         /// The first of them.
@@ -40,7 +85,7 @@ pub enum Machine {
     Condition(Channel),
 }
 
-/// Those that every recording may have, in the order of the parameters; a valve that does not follow comes after them.
+/// Those that every recording may have, in the order of the parameters; actuators that do not follow come after them.
 pub(crate) const MACHINE: [Machine; 10] = [
     Machine::FlowCapacity,
     Machine::Efficiency,
@@ -76,7 +121,7 @@ impl Suspect {
     pub fn channels(&self) -> &'static [Channel] {
         match self {
             Suspect::Sensor(fault) => fault.channels,
-            Suspect::Machine(_) => &[],
+            Suspect::Machine(_) | Suspect::Unmodelled(_) => &[],
         }
     }
 
@@ -91,7 +136,8 @@ impl Suspect {
             }) => "1",
             Suspect::Sensor(SensorFault { channels, .. }) => channels.first().map_or("1", |c| c.unit()),
             Suspect::Machine(Machine::Condition(channel)) => channel.unit(),
-            Suspect::Machine(_) => "1",
+            Suspect::Machine(Machine::SlowAir | Machine::SlowValve) => "s",
+            Suspect::Machine(_) | Suspect::Unmodelled(_) => "1",
         }
     }
 }
@@ -137,6 +183,7 @@ impl fmt::Display for Suspect {
         match self {
             Suspect::Sensor(fault) => fault.fmt(f),
             Suspect::Machine(machine) => f.write_str(&machine_name(*machine)),
+            Suspect::Unmodelled(law) => write!(f, "error of {} (none of these)", law.name()),
         }
     }
 }
@@ -147,6 +194,8 @@ fn machine_name(machine: Machine) -> String {
         Machine::Efficiency => "efficiency of the declared map",
         Machine::ValveArea => "area of the declared valve",
         Machine::ValvePlay => "play of the back-pressure valve",
+        Machine::SlowAir => "delay of P3 behind its command",
+        Machine::SlowValve => "delay of the back-pressure valve behind its command",
         Machine::ValveStuck { first, last, .. } => {
             let (first, last) = (step_number(first), step_number(last));
             return format!(

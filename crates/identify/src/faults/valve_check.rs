@@ -3,7 +3,7 @@
 use crate::IdentifyConfig;
 use crate::faults::balances::valve::{Opening, ln_area, valve_rows};
 use crate::faults::end_readings::{CHANNELS, PerChannel, Readings};
-use crate::faults::found_fault::{FoundFault, Machine, Suspect};
+use crate::faults::found_fault::{FoundFault, Law, Machine, Suspect};
 use crate::faults::nominal_rig::NominalRig;
 use crate::faults::{Hypotheses, find};
 use mapper_core::{Channel, Method, ModelTolerances};
@@ -95,10 +95,10 @@ impl ValveCheck {
         };
         // Most valves follow.
         rows.by_machine.iter().find_map(|(machine, _)| opening(machine))?;
-        let hypotheses = Hypotheses::of(&[rows], &self.config, Some(&nominal));
+        let hypotheses = Hypotheses::of(&[(Law::Valve, rows)], &self.config, Some(&nominal));
         let found = |fault: FoundFault| match fault.suspect {
             Suspect::Machine(machine) => opening(&machine),
-            Suspect::Sensor(_) => None,
+            Suspect::Sensor(_) | Suspect::Unmodelled(_) => None,
         };
         find(&hypotheses, Method::Steady, &[]).into_iter().find_map(found)
     }

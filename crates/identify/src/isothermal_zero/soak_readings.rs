@@ -1,7 +1,7 @@
 //! Readings at standstill: where it is in a recording, and mean and drift of a sensor there.
 
 use mapper_core::unit_factors::S_PER_MIN;
-use mapper_core::{Channel, Recording, Series, StepMarker, is_reading, plausible};
+use mapper_core::{Channel, EventKind, Recording, Series, StepMarker, is_reading, plausible};
 use mapper_numerics::statistics::{mean, nearest_rank};
 
 /// Parts of a soak: its drift is the difference of last and first; the limit leaves the first out. Source: the slope between
@@ -20,7 +20,8 @@ pub(super) fn is_at_rest(speed_rpm: f64) -> bool {
     speed_rpm.abs() < *plausible(Channel::ShaftSpeed).running.start()
 }
 
-/// The last standstill before the first step with a running machine. If steps were detected from the readings, the soak may count as a step.
+/// The last standstill before the first step with a running machine, or the last zero between steps. If steps were detected from the readings, the
+/// soak may count as a step.
 pub(super) fn at_rest(recording: &Recording) -> (f64, f64) {
     let runs = |step: &&StepMarker| {
         let speed = recording.series.get(&Channel::ShaftSpeed);
@@ -28,7 +29,10 @@ pub(super) fn at_rest(recording: &Recording) -> (f64, f64) {
         last.is_none_or(|speed_rpm| !is_at_rest(*speed_rpm))
     };
     let first_s = recording.steps.iter().find(runs).map_or(f64::INFINITY, |step| step.start_s);
-    standstills(recording, first_s).pop().unwrap_or_default()
+    let later =
+        recording.events.iter().rfind(|event| event.kind == EventKind::SoakEnded && event.t_s > first_s);
+    let before_s = later.map_or(first_s, |soak| soak.t_s);
+    standstills(recording, before_s).pop().unwrap_or_default()
 }
 
 /// Every standstill that begins before `before_s`, in order.

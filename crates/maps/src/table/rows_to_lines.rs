@@ -235,6 +235,7 @@ pub(crate) fn surge_marks(map: &CompressorMap, rows: &[Row]) -> Vec<SurgeMark> {
             closest_end_s: 0.0,
             found_by: SurgeFoundBy::File,
             steps: 0,
+            soft: None,
         }
     };
     let mut marks: Vec<SurgeMark> = rows.iter().map(mark).collect();

@@ -312,10 +312,7 @@ pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f
 }
 
 /// Area of the valve at each sample from flow and pressures, m2; `None` without flow, P2 or T2.
-pub(crate) fn valve_areas_m2(
-    table: &Table,
-    (nominal_p1_pa, outlet_volume_m3): (f64, f64),
-) -> Option<Vec<f64>> {
+pub fn valve_areas_m2(table: &Table, (nominal_p1_pa, outlet_volume_m3): (f64, f64)) -> Option<Vec<f64>> {
     let flow = table.column(Channel::CompressorFlow)?;
     let (p2, t2) = (table.column(Channel::P2)?, table.column(Channel::T2)?);
     let p1 = table.column(Channel::P1);

@@ -205,6 +205,7 @@ pub fn true_value(
             return None;
         }
         Channel::RelativeHumidity | Channel::DewPoint => return None,
+        Channel::P1Variation | Channel::P2Variation => return None,
     };
     let hooks = &prepared.model().hooks;
     Some(if hooks.is_empty() { value } else { hooks.reading(&prepared.site(state, outputs), channel, value) })

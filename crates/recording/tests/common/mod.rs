@@ -28,10 +28,9 @@ pub fn batch(samples: usize) -> SampleBatch {
         columns: (0..CHANNELS.len())
             .map(|c| ChannelColumn { channel: CHANNELS[c].channel, values: column(c) })
             .collect(),
-        elements: Vec::new(),
-        provenance: Vec::new(),
         truth: vec![TruthColumn { name: "eta".to_owned(), unit: "1".to_owned(), values: column(30) }],
         events: vec![Event { t_s: 0.15, kind: EventKind::Note, message: "valve is 2 % off".to_owned() }],
+        ..SampleBatch::default()
     }
 }
 

@@ -20,6 +20,7 @@ pub(crate) struct DrawnMap {
     surge: Vec<[f64; 2]>,
     choke: Vec<[f64; 2]>,
     sought: Vec<DrawnMark>,
+    soft: Vec<[f64; 2]>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -95,6 +96,7 @@ pub(crate) fn drawn_map(map: &CompressorMap, display: &Display) -> DrawnMap {
             .collect(),
         surge: places(&drawing.surge),
         choke: places(&drawing.choke),
+        soft: places(&drawing.soft),
         sought: drawing
             .sought
             .iter()

@@ -3,6 +3,7 @@
 use crate::formatting::Display;
 use crate::point_results::points::step_name;
 use crate::point_results::summary::PointResults;
+use crate::test_report::zero_and_sensors::soft_criterion;
 use mapper_core::{CompressorMap, Verdict, step_number, valve_area_text};
 use maud::{Markup, html};
 
@@ -52,6 +53,7 @@ fn legend(results: &PointResults<'_>) -> Markup {
     let has = |verdict| points.iter().any(|scored| scored.point.verdict == verdict);
     let is_fitted = map.is_some_and(|map| map.fitted.is_some());
     let is_sought = map.is_some_and(|map| !map.surge.is_empty());
+    let soft = map.and_then(|map| map.surge.iter().find_map(|mark| mark.soft));
     html! {
         ul.signs aria-label="Signs" {
             @if has(Verdict::Good) { li { svg aria-hidden="true" viewBox="0 0 12 12" { circle cx="6" cy="6" r="4" {} } "good point" } }
@@ -60,6 +62,9 @@ fn legend(results: &PointResults<'_>) -> Markup {
                 li { svg aria-hidden="true" viewBox="0 0 12 12" { path.hollow d="M6 1 10 6 6 11 2 6Z" {} } "no usable efficiency" }
             }
             @if is_sought { li { svg.bad aria-hidden="true" viewBox="0 0 12 12" { rect x="2" y="2" width="8" height="8" {} } "measured surge, with its 95 % interval" } }
+            @if let Some(soft) = soft {
+                li { svg.bad aria-hidden="true" viewBox="0 0 28 12" { path d="M0 6H28" stroke-dasharray="1 4" {} } "soft surge: " (soft_criterion(&soft)) }
+            }
             @if is_fitted {
                 li {
                     svg.bad aria-hidden="true" viewBox="0 0 28 12" { path d="M0 6H28" stroke-dasharray="6 3" {} }

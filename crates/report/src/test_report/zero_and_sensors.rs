@@ -3,7 +3,7 @@
 use crate::document::{Describe, Document, Table};
 use crate::formatting::{Display, number, percent};
 use mapper_campaign::Campaign;
-use mapper_core::{Channel, SurgeFoundBy, SurgeMark, SurgeNotFound, half_width_95};
+use mapper_core::{Channel, SoftSurge, SurgeFoundBy, SurgeMark, SurgeNotFound, half_width_95};
 use mapper_identify::ZeroOutcome;
 use mapper_observe::FusedChannel;
 use mapper_recording::score::ScoredMark;
@@ -103,18 +103,33 @@ pub(crate) fn surge_section(surge: &SurgeReport, display: &Display, truth: bool)
     let units = &display.units;
     let mut heads: Vec<&str> =
         vec![&units.speed, &units.flow, "+/- %", "PR", "+/-", "nearest %", "openings", "found by"];
+    let soft = surge.marks.iter().find_map(|scored| scored.mark.soft);
+    heads.extend(soft.map(|_| "soft"));
     heads.extend(truth.then_some("error %"));
     let mut document = Document::default();
     document.text(
         "Surge-side ends of the lines: corrected speed and flow, half widths of 95 % intervals, distance of the nearest point above in \
          flow, number of openings tried.",
     );
+    if let Some(soft) = soft {
+        document.text(format!("soft: corrected flow at soft surge, {}.", soft_criterion(&soft)));
+    }
     if truth {
         document.text("error: difference from the simulator's truth.");
     }
     document.table(Table::new(heads).with_texts([7]).rows(surge_rows(&surge.marks, display, truth)));
     surge_remarks(surge).into_iter().for_each(|remark| document.text(remark));
     document
+}
+
+/// The criterion of soft surge.
+pub(crate) fn soft_criterion(soft: &SoftSurge) -> String {
+    format!(
+        "where the coefficient of variation of {} reaches {:.3} %, {:.1} times that far from surge (SAE J1826: the onset of fluctuations)",
+        soft.channel,
+        100.0 * soft.variation_ratio,
+        soft.variation_ratio / soft.quiet_ratio
+    )
 }
 
 fn surge_remarks(surge: &SurgeReport) -> Vec<String> {
@@ -131,6 +146,7 @@ fn surge_remarks(surge: &SurgeReport) -> Vec<String> {
 }
 
 fn surge_rows(marks: &[ScoredMark], display: &Display, truth: bool) -> Vec<Vec<String>> {
+    let has_soft = marks.iter().any(|scored| scored.mark.soft.is_some());
     let row = |ScoredMark { mark, truth_flow_corrected_kg_s }: &ScoredMark| {
         let flow_kg_s = mark.flow_corrected_kg_s;
         let mut row = vec![
@@ -143,6 +159,9 @@ fn surge_rows(marks: &[ScoredMark], display: &Display, truth: bool) -> Vec<Vec<S
             mark.steps.to_string(),
             evidence_name(mark).to_owned(),
         ];
+        if has_soft {
+            row.push(mark.soft.map_or_else(|| "-".to_owned(), |soft| display.flow(soft.flow_corrected_kg_s)));
+        }
         if truth {
             row.push(percent(truth_flow_corrected_kg_s.map(|true_kg_s| flow_kg_s / true_kg_s - 1.0), 2));
         }

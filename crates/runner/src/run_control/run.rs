@@ -6,6 +6,7 @@ use crate::run_control::observer::{ObserverError, Operator, Protection, RunError
 use crate::run_control::speed_control::SpeedControl;
 use crate::run_control::transition_control::{Arrival, PressureMotion, TransitionControl};
 use crate::step_source::StepSource;
+use crate::surge::estimate::FastStatistics;
 use crate::surge::mark::SurgeEvents;
 use mapper_core::{
     Backend, BackendError, Clock, Event, EventKind, GuardName, OperatingPoint, PlanStep, Reaction, RigMode,
@@ -80,6 +81,7 @@ pub(crate) struct Run<'a, 'p> {
     pub(crate) arrival: Option<Arrival>,
     pub(crate) p3_motion: PressureMotion,
     surge_events: SurgeEvents,
+    fast: FastStatistics,
     /// Longest delay of P3 that was reported, s.
     pub(crate) reported_late_s: f64,
     /// Whether the valve opens at the start of the safe shutdown: after a surge.
@@ -120,6 +122,7 @@ impl Runner<'_> {
             arrival: None,
             p3_motion: PressureMotion::default(),
             surge_events: SurgeEvents::default(),
+            fast: FastStatistics::default(),
             reported_late_s: 0.0,
             opens_at_once: false,
             at: None,
@@ -372,17 +375,8 @@ impl Run<'_, '_> {
 
     /// Switches the air off before a step that a standstill precedes.
     fn rest_before(&mut self, step: &PlanStep) -> Result<(), Halt> {
-        let duration_s = self.runner.steps.rest_s();
-        if duration_s > 0.0 {
+        if let Some(soak) = self.runner.steps.rest() {
             self.unload()?;
-            let oil_temperature_k = step.oil_temperature_k;
-            let soak = Soak {
-                duration_s,
-                until_settled: false,
-                oil_temperature_k,
-                temperature_sigma_k: 0.0,
-                pressure_sigma_pa: 0.0,
-            };
             self.soak(step, soak)?;
             (self.at, self.commanded.valve) = (None, None);
         }
@@ -396,13 +390,18 @@ impl Run<'_, '_> {
             oil_temperature_k: soak.oil_temperature_k,
             ..setpoints(first)
         })?;
+        // A rest without a stated non-uniformity is no zero.
+        let (name, kinds) = match soak.temperature_sigma_k > 0.0 {
+            true => ("soak", [EventKind::SoakStarted, EventKind::SoakEnded]),
+            false => ("rest", [EventKind::Note, EventKind::Note]),
+        };
         let message = format!(
-            "soak for {}{:.1} min: air off, oil at {}",
+            "{name} for {}{:.1} min: air off, oil at {}",
             if soak.until_settled { "at least " } else { "" },
             soak.duration_s / 60.0,
             mapper_core::temperature(soak.oil_temperature_k)
         );
-        let (t_s, kind) = (self.now_s, EventKind::SoakStarted);
+        let (t_s, kind) = (self.now_s, kinds[0]);
         self.runner.observer.on_event(&Event { t_s, kind, message })?;
         let start_s = self.now_s;
         self.run_until(start_s + soak.duration_s, false, false)?;
@@ -411,11 +410,11 @@ impl Run<'_, '_> {
             self.run_until((self.now_s + REST_CHECK_S).min(start_s + Soak::LONGEST_S), false, false)?;
         }
         let message = if soak.until_settled {
-            format!("soak completed after {:.1} min, air on", (self.now_s - start_s) / 60.0)
+            format!("{name} completed after {:.1} min, air on", (self.now_s - start_s) / 60.0)
         } else {
-            "soak completed, air on".to_owned()
+            format!("{name} completed, air on")
         };
-        let (t_s, kind) = (self.now_s, EventKind::SoakEnded);
+        let (t_s, kind) = (self.now_s, kinds[1]);
         self.runner.observer.on_event(&Event { t_s, kind, message })?;
         Ok(())
     }
@@ -447,7 +446,12 @@ impl Run<'_, '_> {
             self.check_for_stop(in_step, until_s)?;
             let before_s = self.now_s;
             let next_s = self.transition.as_ref().map_or(until_s, |control| before_s + control.interval_s());
-            let (batch, trips) = self.poll_until_trip(next_s.min(until_s), in_step)?;
+            let (mut batch, trips) = self.poll_until_trip(next_s.min(until_s), in_step)?;
+            // Fast samples are recorded at the end of a step, and where the compressor surges.
+            let surges = batch.events.iter().any(|event| event.kind == EventKind::SurgeEntered);
+            if trips.is_empty() && !surges && !(in_step && self.now_s >= until_s) {
+                batch.fast.clear();
+            }
             self.p3_motion.add(&batch);
             if let Some(trip) = trips.iter().find(|trip| trip.reaction.ends_the_run()) {
                 let trip = trip.clone();
@@ -545,6 +549,7 @@ impl Run<'_, '_> {
                 self.plausibility.as_mut().and_then(|watch| watch.judge(&mut batch, &self.commanded));
             trips.extend(judged);
             self.surge_events.join(&mut batch, next_s);
+            self.fast.add_columns(&mut batch);
             match &mut merged {
                 None => merged = Some(batch),
                 Some(merged) => merged.append(batch),

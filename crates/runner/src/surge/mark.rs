@@ -1,7 +1,7 @@
 //! The surge marks of a recording, one for each line with a surge search; and surge events with hysteresis: a compressor in surge crosses the
 //! surge line many times a second, and each surge is one event.
 
-use crate::surge::estimate::{SurgeEstimate, SurgeReading};
+use crate::surge::estimate::{SurgeEstimate, SurgeReading, soft_surge};
 use mapper_core::{
     Channel, DeclaredUncertainty, Event, EventKind, Recording, ReferenceState, SampleBatch, StepKind,
     StepMarker, SurgeFoundBy, SurgeMark, SurgeNotFound,
@@ -131,6 +131,7 @@ fn mark_approach(
         closest_end_s: last.end_s,
         found_by: if surged_at_ratio.is_some() { SurgeFoundBy::Surge } else { SurgeFoundBy::Precursor },
         steps: readings.len(),
+        soft: soft_surge(readings),
     })
 }
 

@@ -4,7 +4,7 @@
 //! which it would diverge. [`choose_next_move`] limits the next closing of the valve, and [`find_surge_marks`] applies the same rules to a whole
 //! recording. docs/reference/maps.md describes them.
 
-mod estimate;
+pub(crate) mod estimate;
 pub(crate) mod mark;
 
 pub use estimate::{

@@ -11,8 +11,9 @@ use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{
-    Channel, CompressorMap, IdentifiedPoint, JsonMessages, Method, PointBudgets, Recording, ResultRemark,
-    StepMarker, StepOrigin, ThermalModel, TurbineHousing, TurbineMap, TurbinePoint, join_recordings,
+    Channel, CompressorMap, EventKind, IdentifiedPoint, JsonMessages, Method, PointBudgets, Recording,
+    ResultRemark, StepMarker, StepOrigin, ThermalModel, TurbineHousing, TurbineMap, TurbinePoint,
+    join_recordings,
 };
 use mapper_diagnose::gap::PointCorrection;
 use mapper_identify::{
@@ -263,8 +264,12 @@ impl Session<'_> {
         let fused = fuse_sensors(recordings, config, campaign, map);
         let sensors = fused.channels.into_iter().next().unwrap_or_default();
         let first = fused.recordings.first().ok_or(SessionError::NoRecording)?;
-        let zero = ZeroOutcome::of(first, &fused.config, soak.map(Into::into));
-        remarks.extend(campaign.filter(|_| soak.is_none()).and_then(|_| unused_rest(first, &fused.config)));
+        // A script may zero without a soak of the campaign.
+        let is_zeroed = first.events.iter().any(|event| event.kind == EventKind::SoakEnded);
+        let settings = soak.map(Into::into).or_else(|| is_zeroed.then(ZeroSettings::default));
+        let zero = ZeroOutcome::of(first, &fused.config, settings);
+        remarks
+            .extend(campaign.filter(|_| settings.is_none()).and_then(|_| unused_rest(first, &fused.config)));
         remarks.extend(zero.found().into_iter().flat_map(contradictions));
         let periodic = zero.found().map_or(&[][..], |zero| zero.periodic.as_slice());
         remarks.extend(periodic.iter().map(|&PeriodicError { channel, period_s, amplitude }| {

@@ -9,7 +9,7 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
 use mapper_core::{
     Channel, IdentifiedPoint, Method, OperatingPoint, Plan, PlanInputHashes, PlanRemark, PlanStep, Predicted,
-    Recording, RigDescription, SampleBatch, Series, SetpointRanges, StepMarker, step_number,
+    Recording, RigDescription, SampleBatch, Series, SetpointRanges, Soak, StepMarker, step_number,
 };
 use mapper_identify::{
     IdentifyConfig, PressureTap, ZeroSettings, expected, expected_after_zero, expected_steady,
@@ -359,7 +359,7 @@ pub(crate) struct ScriptedSteps {
     /// The last two steps with their samples. Identification of the last step needs only these.
     recent: Recording,
     current_step: Option<PlanStep>,
-    rest_s: f64,
+    rest: Option<Soak>,
     settling: Option<SettleWatch>,
     pub(crate) finished: Option<StepResult>,
     pub done: Vec<PlanStep>,
@@ -382,7 +382,7 @@ impl ScriptedSteps {
             cool_down_s: campaign.timing.cool_down_s,
             recent: Recording::default(),
             current_step: None,
-            rest_s: 0.0,
+            rest: None,
             settling: None,
             finished: None,
             done: Vec::new(),
@@ -416,13 +416,13 @@ impl StepSource for ScriptedSteps {
             EndCondition::Dwell => None,
             EndCondition::UntilSettled(rule) => Some(SettleWatch::new(rule, next.step.start_s)),
         };
-        self.rest_s = next.rest_s;
+        self.rest = next.rest;
         self.current_step = Some(next.step.clone());
         Ok(Some(next.step))
     }
 
-    fn rest_s(&self) -> f64 {
-        self.rest_s
+    fn rest(&self) -> Option<Soak> {
+        self.rest
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> bool {

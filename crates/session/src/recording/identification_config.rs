@@ -55,7 +55,7 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         shaft_inertia_kgm2: campaign.machine.params.shaft_inertia_kgm2,
         humidity_sigma_kg_kg: campaign.report.humidity_sigma_kg_kg(&campaign.boundary),
         reference: campaign.reference,
-        valve_play_ratio: campaign.rig_actuators().valve_play_ratio,
+        actuators: Some(campaign.rig_actuators()),
         opening_is_area: true,
         barometer_pa: campaign.report.barometer_pa,
         housing_contact_sigma_ratio: campaign

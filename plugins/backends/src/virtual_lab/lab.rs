@@ -1,6 +1,6 @@
 //! The virtual gas stand: the lumped model behind actuators and sensors, in simulated time.
 
-use super::samples::{Instant, SampleCollector, SensorBank};
+use super::samples::{Instant, SampleCollector, SensorBank, fast_sensors};
 use crate::ACCEPTED_SETPOINTS;
 use crate::virtual_lab::rig::actuator::Actuator;
 use crate::virtual_lab::rig::drift;
@@ -153,6 +153,7 @@ impl Backend for VirtualLab {
                     })
                     .collect(),
                 resonator: Resonator::new(settings.surge_precursor, settings.seed),
+                fast: fast_sensors(settings),
             },
             commands: None,
             now_s: 0.0,

@@ -3,10 +3,10 @@
 
 use crate::virtual_lab::rig::drift;
 use crate::virtual_lab::rig::running::{P2_SHARE, Resonator, Swing};
-use crate::virtual_lab::sensors::{ElementBank, SecondOrderFollower, Sensor};
+use crate::virtual_lab::sensors::{ElementBank, SecondOrderFollower, Sensor, SensorErrors};
 use crate::virtual_lab::settings_file::LabSettings;
 use mapper_core::{
-    CHANNELS, Channel, ChannelColumn, ElementColumn, Event, MODELLED_CHANNELS, SampleBatch, Setpoints,
+    CHANNELS, Channel, ChannelColumn, ElementColumn, Event, FastSamples, MODELLED_CHANNELS, SampleBatch, Setpoints,
     TruthColumn,
 };
 use mapper_physics::gas::mixture::Gas;
@@ -65,10 +65,28 @@ pub(crate) struct SensorBank {
     pub(crate) redundant: Vec<ElementBank>,
     /// Fluctuations of flow and pressures before surge.
     pub(crate) resonator: Resonator,
+    /// Fast sensors of P1 and P2; empty without a fast rate.
+    pub(crate) fast: Vec<(Channel, Sensor)>,
+}
+
+/// Offset of the random streams of fast sensors, above those of redundant ones.
+const STREAMS_OF_SENSORS: u64 = 1_000_000;
+
+/// The fast sensors of P1 and P2: white noise of the declared size, no fixed error.
+pub(crate) fn fast_sensors(settings: &LabSettings) -> Vec<(Channel, Sensor)> {
+    let Some(rate_hz) = settings.fast_rate_hz else { return Vec::new() };
+    let sensor = |channel: Channel| {
+        let errors = settings.sensors.get(&channel).copied().unwrap_or_default();
+        let white_sigma = errors.white_sigma.hypot(errors.coloured_sigma);
+        let errors = SensorErrors { white_sigma, ..SensorErrors::default() };
+        Sensor::new(errors, 1.0 / rate_hz, settings.seed, STREAMS_OF_SENSORS + channel as u64)
+    };
+    [Channel::P1, Channel::P2].map(|channel| (channel, sensor(channel))).into()
 }
 
 pub(crate) struct SampleCollector {
     first_sequence: u64,
+    fast: Vec<FastSamples>,
     t_s: Vec<f64>,
     columns: Vec<Vec<f64>>,
     elements: Vec<ElementColumn>,
@@ -79,6 +97,7 @@ impl SampleCollector {
     pub(crate) fn new(first_sequence: u64, sensor_bank: &SensorBank) -> Self {
         SampleCollector {
             first_sequence,
+            fast: Vec::new(),
             t_s: Vec::new(),
             columns: vec![Vec::new(); MODELLED_CHANNELS],
             elements: sensor_bank.redundant.iter().flat_map(ElementBank::columns).collect(),
@@ -102,8 +121,8 @@ impl SampleCollector {
         self.t_s.push(t_s);
         let surge_flow_kg_s = instant.surge_flow_kg_s(settings);
         let prepared = instant.running.map(|_| settings.model.prepare(&instant.boundary));
-        let SensorBank { sensors, followers, second_order, redundant, resonator } = sensor_bank;
-        let swing = compute_swing(t_s, instant, surge_flow_kg_s, resonator, settings);
+        let swing = self.push_fast(t_s, instant, surge_flow_kg_s, (sensor_bank, prepared.as_ref()), settings);
+        let SensorBank { sensors, followers, second_order, redundant, .. } = sensor_bank;
         let mut elements = self.elements.iter_mut();
         let follow = followers.iter_mut().zip(second_order);
         for ((row, column), (follower, second)) in CHANNELS.iter().zip(&mut self.columns).zip(follow) {
@@ -133,6 +152,46 @@ impl SampleCollector {
         self.truth.push(states, turbine_efficiency, instant.outputs());
     }
 
+    /// The swing at `t_s`, and the fast samples since the last sample if the lab has them.
+    fn push_fast(
+        &mut self,
+        t_s: f64,
+        instant: &Instant<'_>,
+        surge_flow_kg_s: f64,
+        (bank, prepared): (&mut SensorBank, Option<&PreparedModel<'_>>),
+        settings: &LabSettings,
+    ) -> Swing {
+        let interval_s = 1.0 / settings.sample_rate_hz;
+        let Some(rate_hz) = settings.fast_rate_hz else {
+            return compute_swing((t_s, interval_s), instant, surge_flow_kg_s, &mut bank.resonator, settings);
+        };
+        let count = (rate_hz * interval_s).round().max(1.0);
+        let fast_s = interval_s / count;
+        let mut swing = Swing::default();
+        let begin_s = t_s - interval_s + fast_s;
+        let still = |channel| {
+            true_value(channel, instant, prepared, None, Swing::default(), &settings.instruments)
+        };
+        let still = bank.fast.iter().map(|(channel, _)| still(*channel)).collect::<Vec<f64>>();
+        let mut values = vec![Vec::with_capacity(count as usize); still.len()];
+        for index in 0..count as usize {
+            let now_s = begin_s + index as f64 * fast_s;
+            swing = compute_swing((now_s, fast_s), instant, surge_flow_kg_s, &mut bank.resonator, settings);
+            for (((channel, sensor), still), values) in bank.fast.iter_mut().zip(&still).zip(&mut values) {
+                let ratio = if *channel == Channel::P1 { swing.p1_ratio } else { swing.p2_ratio };
+                values.push(sensor.read(still * (1.0 + ratio)));
+            }
+        }
+        let channels = bank.fast.iter().map(|(channel, _)| *channel);
+        self.fast.extend(channels.zip(values).map(|(channel, values)| FastSamples {
+            channel,
+            first_s: begin_s,
+            interval_s: fast_s,
+            values,
+        }));
+        swing
+    }
+
     pub(crate) fn finish(self, events: Vec<Event>) -> SampleBatch {
         let columns = CHANNELS.iter().zip(self.columns);
         SampleBatch {
@@ -143,13 +202,14 @@ impl SampleCollector {
             truth: self.truth.finish(),
             t_s: self.t_s,
             events,
+            fast: self.fast,
         }
     }
 }
 
-/// Fluctuations of flow and pressures: the surge cycle in surge, the precursor before it.
+/// Fluctuations of flow and pressures `since_s` after the last ones: the surge cycle in surge, the precursor before it.
 fn compute_swing(
-    t_s: f64,
+    (t_s, since_s): (f64, f64),
     instant: &Instant<'_>,
     surge_flow_kg_s: f64,
     resonator: &mut Resonator,
@@ -165,7 +225,7 @@ fn compute_swing(
     // Half of the fluctuation in surge, at which the surge cycle takes over.
     let max_rms_ratio = 0.5 * settings.surge_swing_ratio;
     let params = &settings.model.params;
-    resonator.next(margin_ratio, 1.0 / settings.sample_rate_hz, params, outputs.t2_k, max_rms_ratio)
+    resonator.next(margin_ratio, since_s, params, outputs.t2_k, max_rms_ratio)
 }
 
 /// Static pressure at the pipe wall of one of the four stations; the total pressure if the pipe would choke.

@@ -29,6 +29,8 @@ struct SettingsFile {
     rig: Option<String>,
     /// Samples per second; default 10 Hz.
     sample_rate: Option<Quantity<Frequency>>,
+    /// Rate of fast samples of P1 and P2; default none.
+    fast_rate: Option<Quantity<Frequency>>,
     /// `standstill` (cold, the default) or `settled` (in steady state at the first setpoints).
     start: Start,
     /// `declared` (the default) or `none`.
@@ -186,6 +188,8 @@ pub fn read_settings(
     let model = Model { params: apply_true_params(*params, &file.machine)?, ..nominal.model.clone() };
     let sample_rate_hz = file.sample_rate.map_or(10.0, |rate| rate.value);
     check_range(sample_rate_hz, "Hz", 0.1..=1000.0).map_err(|problem| problem.at("sample_rate"))?;
+    let fast_rate_hz = file.fast_rate.map(|rate| rate.value);
+    check_range(fast_rate_hz.unwrap_or(1e3), "Hz", 100.0..=10e3).map_err(|problem| problem.at("fast_rate"))?;
     let surge_swing_ratio = file.surge_swing.map_or(0.08, |swing| swing.value);
     check_range(100.0 * surge_swing_ratio, "%", 0.0..=100.0).map_err(|problem| problem.at("surge_swing"))?;
     let mut rig = Rig::new(model);
@@ -211,6 +215,7 @@ pub fn read_settings(
         cell: nominal.boundary,
         rig: file.rig.clone(),
         sample_rate_hz,
+        fast_rate_hz,
         start: file.start,
         p3_actuator: actuators.turbine_inlet_pressure.dynamics("turbine_inlet_pressure", &declared.p3)?,
         t3_actuator: actuators
@@ -388,6 +393,8 @@ pub struct LabSettings {
     pub rig: Option<String>,
     /// Sample rate, Hz.
     pub sample_rate_hz: f64,
+    /// Rate of fast samples of P1 and P2, Hz; `None` for none.
+    pub fast_rate_hz: Option<f64>,
     /// State at arming.
     pub start: Start,
     /// Turbine inlet pressure, Pa.
@@ -443,6 +450,7 @@ impl LabSettings {
             cell,
             rig: None,
             sample_rate_hz: 10.0,
+            fast_rate_hz: None,
             start: Start::Settled,
             p3_actuator: at_once,
             t3_actuator: at_once,

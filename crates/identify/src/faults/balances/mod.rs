@@ -1,4 +1,4 @@
-//! Physical relations that reveal sensor faults: head, housing heat, inlet temperature, valve flow, efficiency, convection, conditions, and rest.
+//! Physical relations that reveal sensor faults: head, housing heat, inlet temperature, valve flow, motion, efficiency, convection, conditions, and rest.
 
 pub(crate) mod efficiency;
 pub(crate) mod housing;

@@ -31,8 +31,8 @@ const MIN_SPEED_CHANGE_RATIO: f64 = 0.03;
 const HOLD_OVERSHOOT_SHARE: f64 = 0.25;
 /// Distance from the limit of speed at which P3 stops rising, relative. Judgement: twice the change of a fast shaft in one interval.
 const LIMIT_DISTANCE_RATIO: f64 = 0.01;
-/// Time over which the speed is extrapolated, s, beyond the delay of P3, and the longest such delay. Judgement: a third of a shaft's usual time
-/// constant; the rate of a speed says nothing of later.
+/// Time over which the speed is extrapolated, s, while slow air arrives beyond its delay, which is limited. Judgement: a third of a shaft's usual
+/// time constant; the rate of a speed says nothing of later.
 const AHEAD_S: f64 = 0.3;
 const MAX_DELAY_S: f64 = 0.5;
 /// Shortest time in which P3 falls back to its start and rises again, s, and in delays of P3. Judgement: a faster one makes the shaft swing.
@@ -125,7 +125,7 @@ impl TransitionControl {
 
     /// Interval of the commands, s: a multiple of the shortest, so that samples at 10 Hz show when each was sent.
     pub(crate) fn interval_s(&self) -> f64 {
-        if self.is_sent() && self.now_s - self.start_s > self.ramps.end_s() + WATCH_S {
+        if self.is_sent() && self.is_late() {
             // P3 only arrives.
             return INTERVAL_S.1;
         }
@@ -213,7 +213,7 @@ impl TransitionControl {
         // Close to the limit P3 rises more slowly, and beyond it P3 falls: the valve has not arrived yet.
         let room =
             self.speed_ahead_rpm().map_or(1.0, |rpm| (1.0 - rpm / self.limit_rpm()) / LIMIT_DISTANCE_RATIO);
-        if room < 0.0 && !self.has_stopped {
+        if self.is_late() && room < 0.0 && !self.has_stopped {
             self.has_stopped = true;
             // What P3 has been commanded but has not reached would raise the shaft further.
             if let (Some(first_pa), Some(latest_pa)) = (self.first.0, self.latest.0) {
@@ -222,10 +222,19 @@ impl TransitionControl {
             }
         }
         let p3 = &self.stand.actuators.p3;
-        let slowest_s = MIN_RETREAT_S.max(DELAYS_OF_RETREAT * (p3.lag_s + p3.dead_time_s));
-        let change_s = if self.has_stopped { ramp_s.max(slowest_s) } else { ramp_s };
-        let rate_per_s = room.clamp(-1.0, 1.0) / change_s;
-        self.p3_share = (self.p3_share + rate_per_s * step_s).clamp(0.0, planned);
+        let change_s = match room < 0.0 {
+            _ if self.has_stopped => {
+                ramp_s.max(MIN_RETREAT_S).max(DELAYS_OF_RETREAT * (p3.lag_s + p3.dead_time_s))
+            }
+            true => ramp_s.max(MIN_RETREAT_S),
+            false => ramp_s,
+        };
+        self.p3_share = (self.p3_share + room.clamp(-1.0, 1.0) / change_s * step_s).clamp(0.0, planned);
+    }
+
+    /// Whether the ramps are over, and a fast stand would have arrived.
+    fn is_late(&self) -> bool {
+        self.now_s - self.start_s > self.ramps.end_s() + WATCH_S
     }
 
     /// Speed above which P3 stops rising, rpm.
@@ -238,7 +247,8 @@ impl TransitionControl {
     /// The speed that the shaft reaches soon if it goes on as before, rpm.
     fn speed_ahead_rpm(&self) -> Option<f64> {
         let p3 = &self.stand.actuators.p3;
-        let ahead_s = AHEAD_S + (p3.lag_s + p3.dead_time_s).min(MAX_DELAY_S);
+        let ahead_s =
+            AHEAD_S + if self.is_late() { (p3.lag_s + p3.dead_time_s).min(MAX_DELAY_S) } else { 0.0 };
         self.speed_and_rate().map(|(now_rpm, rate_rpm_s)| now_rpm + ahead_s * rate_rpm_s.max(0.0))
     }
 

@@ -195,6 +195,15 @@ impl<'a> SpeedControl<'a> {
         self.extra_delay_s = self.extra_delay_s.max(delay_s.min(MAX_EXTRA_DELAY_S));
     }
 
+    /// Continues from a command other than that with which the step began, Pa, sent at `t_s`.
+    pub fn continue_from(&mut self, p3_pa: f64, t_s: f64) {
+        if let Some(hold) = &mut self.hold {
+            hold.setpoint_pa = p3_pa;
+        }
+        self.last_sent_pa = Some(p3_pa);
+        self.restart_wait(t_s);
+    }
+
     /// Restarts the wait for the transient, when the last command of a transition was sent at `t_s`.
     pub fn restart_wait(&mut self, t_s: f64) {
         if let Some(hold) = &mut self.hold {

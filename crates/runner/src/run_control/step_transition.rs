@@ -80,9 +80,13 @@ impl Run<'_, '_> {
                 speed.restart_wait(now_s);
             }
         }
-        let is_complete = control.is_complete();
+        let is_complete = control.is_complete(p3_moves);
         if !is_complete {
             self.transition = Some(control);
+        } else if !control.is_sent()
+            && let Some(speed) = &mut self.runner.speed
+        {
+            speed.continue_from(next.p3_pa, self.now_s);
         }
         Ok(!is_complete)
     }

@@ -31,10 +31,15 @@ const MIN_SPEED_CHANGE_RATIO: f64 = 0.03;
 const HOLD_OVERSHOOT_SHARE: f64 = 0.25;
 /// Distance from the limit of speed at which P3 stops rising, relative. Judgement: twice the change of a fast shaft in one interval.
 const LIMIT_DISTANCE_RATIO: f64 = 0.01;
-/// Time over which the speed is extrapolated, s. Judgement: a third of a shaft's usual time constant.
+/// Time over which the speed is extrapolated, s, while slow air arrives beyond its delay, which is limited. Judgement: a third of a shaft's usual
+/// time constant; the rate of a speed says nothing of later.
 const AHEAD_S: f64 = 0.3;
-/// Shortest time in which P3 falls back to its start, s. Judgement: a faster one makes the shaft swing.
+const MAX_DELAY_S: f64 = 0.5;
+/// Shortest time in which P3 falls back to its start and rises again, s, and in delays of P3. Judgement: a faster one makes the shaft swing.
 const MIN_RETREAT_S: f64 = 3.0;
+const DELAYS_OF_RETREAT: f64 = 2.0;
+/// Longest search for a pressure at which the shaft keeps its speed, s. Judgement: half of a usual step.
+const MAX_SEARCH_S: f64 = 20.0;
 /// Time after the ramps in which the shaft may overshoot, s. Judgement: three time constants of a usual shaft.
 const WATCH_S: f64 = 4.0;
 /// Time after the expected arrival of P3 at which its rest is judged, s. Judgement: the time over which its motion is measured.
@@ -67,6 +72,10 @@ pub(crate) struct TransitionControl {
     speeds: VecDeque<(f64, f64)>,
     /// Whether P3 and shaft have come to rest.
     leader_rests: bool,
+    /// Whether P3 has stopped rising where it was, because the shaft was about to exceed its limit.
+    has_stopped: bool,
+    /// Time since which the shaft rests above its target, s.
+    too_fast_since_s: Option<f64>,
 }
 
 impl TransitionControl {
@@ -109,11 +118,17 @@ impl TransitionControl {
             latest: (None, None),
             speeds: VecDeque::new(),
             leader_rests: false,
+            has_stopped: false,
+            too_fast_since_s: None,
         })
     }
 
     /// Interval of the commands, s: a multiple of the shortest, so that samples at 10 Hz show when each was sent.
     pub(crate) fn interval_s(&self) -> f64 {
+        if self.is_sent() && self.is_late() {
+            // P3 only arrives.
+            return INTERVAL_S.1;
+        }
         let interval_s = (self.ramps.end_s() / COMMANDS).clamp(INTERVAL_S.0, INTERVAL_S.1);
         INTERVAL_S.0 * (interval_s / INTERVAL_S.0).round()
     }
@@ -129,11 +144,20 @@ impl TransitionControl {
         self.p3_share >= 1.0 && self.valve_share >= 1.0
     }
 
-    /// Whether all commands have been sent, and the shaft does not overshoot.
-    pub(crate) fn is_complete(&self) -> bool {
+    /// Whether the valve has its last command, and P3 has its own and has arrived. The control of the speed goes on where P3 would hold the shaft
+    /// above its target, or has not found a pressure that does not.
+    pub(crate) fn is_complete(&self, p3_moves: bool) -> bool {
         let rises = self.to.p3_pa > self.from.p3_pa;
+        let since_s = self.now_s - self.start_s;
         let watched_s = self.ramps.end_s() + if rises { WATCH_S } else { 0.0 };
-        self.is_sent() && self.now_s - self.start_s >= watched_s
+        let is_found = match self.p3_share >= 1.0 {
+            true => !(rises && p3_moves && since_s < MAX_WAIT_S),
+            false => {
+                let stays_too_fast = self.too_fast_since_s.is_some_and(|from_s| self.now_s - from_s > REST_S);
+                stays_too_fast || self.has_stopped && since_s > watched_s + MAX_SEARCH_S
+            }
+        };
+        self.valve_share >= 1.0 && since_s >= watched_s && is_found
     }
 
     pub(crate) fn setpoints(&self) -> Setpoints {
@@ -171,6 +195,9 @@ impl TransitionControl {
         let step_s = (now_s - self.now_s).max(0.0);
         self.now_s = now_s;
         self.leader_rests = self.find_rest(p3_moves);
+        let is_too_fast =
+            self.speed_and_rate().is_some_and(|speed| speed.0 > self.targets_rpm.1 && is_resting(speed));
+        self.too_fast_since_s = is_too_fast.then(|| self.too_fast_since_s.unwrap_or(now_s));
         self.advance_p3(step_s);
         self.advance_valve(step_s);
         self.setpoints()
@@ -186,11 +213,28 @@ impl TransitionControl {
         // Close to the limit P3 rises more slowly, and beyond it P3 falls: the valve has not arrived yet.
         let room =
             self.speed_ahead_rpm().map_or(1.0, |rpm| (1.0 - rpm / self.limit_rpm()) / LIMIT_DISTANCE_RATIO);
-        let rate_per_s = match room.clamp(-1.0, 1.0) {
-            falling if falling < 0.0 => falling / ramp_s.max(MIN_RETREAT_S),
-            rising => rising / ramp_s,
+        if self.is_late() && room < 0.0 && !self.has_stopped {
+            self.has_stopped = true;
+            // What P3 has been commanded but has not reached would raise the shaft further.
+            if let (Some(first_pa), Some(latest_pa)) = (self.first.0, self.latest.0) {
+                let reached = (latest_pa - first_pa) / (self.to.p3_pa - self.from.p3_pa);
+                self.p3_share = self.p3_share.min(reached.max(0.0));
+            }
+        }
+        let p3 = &self.stand.actuators.p3;
+        let change_s = match room < 0.0 {
+            _ if self.has_stopped => {
+                ramp_s.max(MIN_RETREAT_S).max(DELAYS_OF_RETREAT * (p3.lag_s + p3.dead_time_s))
+            }
+            true => ramp_s.max(MIN_RETREAT_S),
+            false => ramp_s,
         };
-        self.p3_share = (self.p3_share + rate_per_s * step_s).clamp(0.0, planned);
+        self.p3_share = (self.p3_share + room.clamp(-1.0, 1.0) / change_s * step_s).clamp(0.0, planned);
+    }
+
+    /// Whether the ramps are over, and a fast stand would have arrived.
+    fn is_late(&self) -> bool {
+        self.now_s - self.start_s > self.ramps.end_s() + WATCH_S
     }
 
     /// Speed above which P3 stops rising, rpm.
@@ -202,7 +246,10 @@ impl TransitionControl {
 
     /// The speed that the shaft reaches soon if it goes on as before, rpm.
     fn speed_ahead_rpm(&self) -> Option<f64> {
-        self.speed_and_rate().map(|(now_rpm, rate_rpm_s)| now_rpm + AHEAD_S * rate_rpm_s.max(0.0))
+        let p3 = &self.stand.actuators.p3;
+        let ahead_s =
+            AHEAD_S + if self.is_late() { (p3.lag_s + p3.dead_time_s).min(MAX_DELAY_S) } else { 0.0 };
+        self.speed_and_rate().map(|(now_rpm, rate_rpm_s)| now_rpm + ahead_s * rate_rpm_s.max(0.0))
     }
 
     /// The latest speed, rpm, and its rate over the last samples, rpm/s.
@@ -254,9 +301,13 @@ impl TransitionControl {
     fn find_rest(&self, p3_moves: bool) -> bool {
         let follow_s = self.stand.actuators.p3.follow_s() + REST_S;
         let is_late = self.now_s - self.start_s > self.ramps.p3.end_s() + follow_s;
-        let rests = |(now_rpm, rate_rpm_s): (f64, f64)| rate_rpm_s.abs() < RESTING_PER_S * now_rpm;
-        is_late && !p3_moves && self.speed_and_rate().is_none_or(rests)
+        is_late && !p3_moves && self.speed_and_rate().is_none_or(is_resting)
     }
+}
+
+/// Whether a shaft at this speed, rpm, and rate, rpm/s, has come to rest.
+fn is_resting((now_rpm, rate_rpm_s): (f64, f64)) -> bool {
+    rate_rpm_s.abs() < RESTING_PER_S * now_rpm
 }
 
 pub(crate) struct Arrival {
@@ -380,7 +431,7 @@ mod tests {
             let sent = control.advance(&batch(t_s, p3_pa, 150e3), t_s, true);
             let (fallen, opened) = ((300e3 - p3_pa) / 170e3, (sent.valve_opening_ratio - 0.5) / 2.0);
             assert!(opened <= fallen + Ramps::AHEAD_SHARE + 1e-9, "{t_s} s: {opened} of {fallen}");
-            if control.is_complete() {
+            if control.is_complete(false) {
                 complete_s = complete_s.min(t_s);
             }
             p3_pa += 0.1 / 5.0 * (sent.p3_pa - p3_pa);

@@ -189,7 +189,7 @@ const JUMP_SHARE: f64 = 0.3;
 const FOLLOWS: std::ops::Range<f64> = 0.5..2.0;
 /// Error of the delay in one jump, one standard deviation, s. Bound: three samples at 10 Hz.
 const OWN_DELAY_S: f64 = 0.3;
-/// Error of all delays, one standard deviation, s and share of the declared one. Judgement: the interval of a commissioning is a tenth.
+/// Error of all delays, one standard deviation, s and share of the declared one. Bound: the interval of a commissioning is a tenth of it.
 const COMMON_DELAY: (f64, f64) = (0.1, 0.2);
 /// Fewest jumps. Bound: a scatter has a meaning.
 const MIN_JUMPS: usize = 4;

@@ -4,7 +4,7 @@ use Measured::{
     Efficiency, Flow, Humidity, Opening, Pressure, PressureRatio, Speed, Temperature, Vane, VolumeFlow,
 };
 use Word::{
-    Acronym, After, Air, Ambient, Bearing, Before, Charge, Command, Compression, Compressor, Computed,
+    Acronym, After, Air, Ambient, Back, Bearing, Before, Charge, Command, Compression, Compressor, Computed,
     Cooler, Corrected, Dew, Engine, Exhaust, Expansion, Filler, Housing, In, Is, Manifold, Oil, Other, Out,
     Ratio, Shaft, Static, Total, Turbine,
 };
@@ -262,7 +262,7 @@ pub enum Measured {
 ///
 /// `Ratio` is a pressure ratio if the name contains a pressure. `Shaft` is also the turbocharger as a whole. `Exhaust` and `Air` are the
 /// gases of turbine and compressor, and `Charge` is the compressed air. `Other` is any other part of the stand, a difference, a limit or an
-/// uncertainty; `Engine` always has `Other` too. `Acronym` marks abbreviations such as CIT (compressor inlet temperature).
+/// uncertainty; `Engine` always has `Other` too. `Back` is the pressure behind a machine, seldom before a turbine. `Acronym` marks abbreviations such as CIT (compressor inlet temperature).
 #[allow(missing_docs, reason = "the names are words of the table")]
 #[rustfmt::skip]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -270,7 +270,7 @@ pub enum Word {
     Is(Measured), Ratio, Compression, Expansion,
     Compressor, Turbine, Shaft, Exhaust, Air, Charge, Oil, Housing, Bearing, Ambient, Dew, Engine, Manifold, Cooler, Other,
     In, Out, Before, After, Acronym,
-    Total, Static, Corrected, Computed, Command, Filler,
+    Total, Static, Corrected, Computed, Command, Back, Filler,
 }
 
 /// Words without accents, umlauts as two letters. Words of one or two letters count alone, or at an end of a compound.
@@ -287,7 +287,7 @@ const TABLE: &[(&[Word], &str)] = &[
     (&[Is(Pressure), Compressor, Out, Acronym], "cop cdp"),
     (&[Is(Pressure), Turbine, In, Acronym], "tip"),
     (&[Is(Pressure), Turbine, Out, Acronym], "top"),
-    (&[Is(Pressure)], "backpressure press prs pressure druck pression presion pressione pressao druk tryck cisnienie tlak давлен 压力 气压 压 圧力 圧"),
+    (&[Is(Pressure)], "press prs pressure druck pression presion pressione pressao druk tryck cisnienie tlak давлен 压力 气压 压 圧力 圧"),
     (&[Is(Pressure), Total], "pt"),
     (&[Is(Pressure), Static], "ps"),
     (&[Is(Pressure), Charge], "ladedruck laddtryck laaddruk 過給圧"),
@@ -339,7 +339,9 @@ const TABLE: &[(&[Word], &str)] = &[
     (&[Cooler, Other], "cooler intercooler aftercooler ladeluftkuehler kuehler cac llk 中冷"),
     // Differences, limits and uncertainties.
     (&[Other], "dp dt delta diff difference differenz differenzdruck drop loss verlust druckverlust druckabfall perte chute caida ecart rise perepad перепад разност 压差 温差 温升 差 limit limits alarm trip warn warning grenze grenzwert limite uncertainty unsicherheit incertitude error fehler tolerance 报警 极限 不确定度"),
-    (&[Filler], "back dot of the der dem du de la le des del do da della di at rate parameter mean avg measured на в"),
+    (&[Is(Pressure), Back], "backpressure"),
+    (&[Back], "back"),
+    (&[Filler], "dot of the der dem du de la le des del do da della di at rate parameter mean avg measured на в"),
 ];
 
 static WORDS: LazyLock<HashMap<&str, &[Word]>> = LazyLock::new(|| {

@@ -6,8 +6,8 @@ use crate::virtual_lab::rig::running::{P2_SHARE, Resonator, Swing};
 use crate::virtual_lab::sensors::{ElementBank, SecondOrderFollower, Sensor, SensorErrors};
 use crate::virtual_lab::settings_file::LabSettings;
 use mapper_core::{
-    CHANNELS, Channel, ChannelColumn, ElementColumn, Event, FastSamples, MODELLED_CHANNELS, SampleBatch, Setpoints,
-    TruthColumn,
+    CHANNELS, Channel, ChannelColumn, ElementColumn, Event, FastSamples, MODELLED_CHANNELS, SampleBatch,
+    Setpoints, TruthColumn,
 };
 use mapper_physics::gas::mixture::Gas;
 use mapper_physics::gas::pressure_tap;
@@ -169,9 +169,8 @@ impl SampleCollector {
         let fast_s = interval_s / count;
         let mut swing = Swing::default();
         let begin_s = t_s - interval_s + fast_s;
-        let still = |channel| {
-            true_value(channel, instant, prepared, None, Swing::default(), &settings.instruments)
-        };
+        let still =
+            |channel| true_value(channel, instant, prepared, None, Swing::default(), &settings.instruments);
         let still = bank.fast.iter().map(|(channel, _)| still(*channel)).collect::<Vec<f64>>();
         let mut values = vec![Vec::with_capacity(count as usize); still.len()];
         for index in 0..count as usize {

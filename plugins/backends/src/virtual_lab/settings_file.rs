@@ -189,7 +189,8 @@ pub fn read_settings(
     let sample_rate_hz = file.sample_rate.map_or(10.0, |rate| rate.value);
     check_range(sample_rate_hz, "Hz", 0.1..=1000.0).map_err(|problem| problem.at("sample_rate"))?;
     let fast_rate_hz = file.fast_rate.map(|rate| rate.value);
-    check_range(fast_rate_hz.unwrap_or(1e3), "Hz", 100.0..=10e3).map_err(|problem| problem.at("fast_rate"))?;
+    check_range(fast_rate_hz.unwrap_or(1e3), "Hz", 100.0..=10e3)
+        .map_err(|problem| problem.at("fast_rate"))?;
     let surge_swing_ratio = file.surge_swing.map_or(0.08, |swing| swing.value);
     check_range(100.0 * surge_swing_ratio, "%", 0.0..=100.0).map_err(|problem| problem.at("surge_swing"))?;
     let mut rig = Rig::new(model);

@@ -279,7 +279,7 @@ impl ColumnName {
         }
         let vague = |station| Some((Place::Station(station), Clarity::Vague));
         match (self.has(Word::Exhaust), self.has(Word::Charge), is_in, is_out) {
-            (true, _, is_in, false) if is_in || !self.has(Word::Back) => vague(3),
+            (true, _, _, false) if self.has(Word::Before) || !self.has(Word::Back) => vague(3),
             (false, true, ..) => vague(2),
             (false, false, true, false) if self.is_known() => vague(1),
             (false, false, false, true) if self.is_known() => vague(2),

@@ -119,7 +119,7 @@ def random_stand(number):
 
 
 def sweep(study, first, count):
-    said = re.compile(r"\| ([\d.]+) krpm \| overshoots \[(.*?)\] \| surges (\d+) \| margin (\S+) % .* \| (.*?) \|$")
+    line_of = re.compile(r"\| ([\d.]+) krpm \| overshoots \[(.*?)\] \| surges (\d+) \| margin (\S+) % .* \| (.*?) \|$")
     left = 0
     for number in range(int(first), int(first) + int(count)):
         text, limit, drawn = random_stand(number)
@@ -127,7 +127,7 @@ def sweep(study, first, count):
             file = pathlib.Path(folder) / "stand.yaml"
             file.write_text(text)
             lines = subprocess.run([study, file, str(number)], capture_output=True, text=True).stdout.strip().splitlines()
-        found = said.search(lines[-1]) if lines else None
+        found = line_of.search(lines[-1]) if lines else None
         overshoots = [float(one) for one in re.findall(r"\(([\d.-]+), \d+\)", found[2])] if found else []
         if not found or float(found[1]) > limit or max(overshoots, default=0) > 2 or int(found[3]) or float(found[4]) < 4.5 or found[5] != "Completed":
             left += 1

@@ -12,7 +12,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "sae",
     extension: "txt",
     further_extensions: &["map", "sae", "dat", "cmp", "tsv", "prn"],
-    description: "SAE text: corrected rpm, corrected kg/s, pressure ratio, efficiency in columns of ten; beside it NAME.points.csv with all digits and intervals",
+    description: "SAE text: corrected rpm, corrected kg/s, pressure ratio, efficiency in columns of ten; and NAME.points.csv with all digits and intervals",
     write: Some(write),
     read: Some(read_any_bytes),
     companion: Some(("points.csv", crate::csv::write)),

@@ -452,7 +452,7 @@ fn what_is_called_sure_is_right() {
             });
             let right = holds == Holds::A(proposed.channel) && (read / si - 1.0).abs() < 1e-3;
             found += usize::from(right && proposed.certainty > Certainty::Unsure);
-            let said = || {
+            let proposal = || {
                 format!(
                     "{index}: {} for {} in {:?}",
                     header.title(name, holds),
@@ -463,11 +463,11 @@ fn what_is_called_sure_is_right() {
             match proposed.certainty {
                 Certainty::Sure => {
                     sure += 1;
-                    wrong.extend((!right).then(said));
+                    wrong.extend((!right).then(proposal));
                 }
                 Certainty::Likely => {
                     likely += 1;
-                    likely_wrong.extend((!right).then(said));
+                    likely_wrong.extend((!right).then(proposal));
                 }
                 Certainty::Unsure => {}
             }

@@ -70,7 +70,7 @@ fn a_late_air_supply_and_a_late_valve_are_named_with_their_delays() {
     }
 }
 
-/// A T1 that depends on the valve is no fault of the catalogue: no sensor is named for it.
+/// A T1 that depends on the valve is not in the catalogue of faults: no sensor is named for it.
 #[test]
 fn a_cause_outside_the_catalogue_is_none_of_the_faults() {
     let lab = "virtual_lab: {effects: {t1_with_valve: 2 K}}";

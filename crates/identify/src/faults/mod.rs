@@ -162,7 +162,7 @@ pub(crate) fn find(hypotheses: &Hypotheses, method: Method, standstills: &[Stand
     let others: Vec<FoundFault> = unmodelled.explanation.members.iter().map(found).collect();
     let (none, odds) = (Suspect::Unmodelled(law), unmodelled.ln_odds.exp());
     let is_among = |suspect: &Suspect| others.iter().any(|other| other.suspect == *suspect);
-    // It answers for what it replaces: errors beside all of them are the fit's to judge.
+    // It answers for what it replaces: further errors are judged by the fit.
     let replaced: Vec<FoundFault> =
         faults.iter().filter(|fault| !is_among(&fault.suspect)).cloned().collect();
     if odds > 1.0 && !replaced.is_empty() {
@@ -272,7 +272,7 @@ fn priors(
         Suspect::Machine(Machine::FlowCapacity | Machine::Efficiency | Machine::ValveArea) => {
             OTHER_MACHINE_RATIO
         }
-        // It is no parameter.
+        // It has no parameter.
         Suspect::Unmodelled(_) => 1.0,
     };
     let sigmas: Vec<f64> = suspects.iter().map(sigma).collect();

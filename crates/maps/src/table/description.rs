@@ -287,7 +287,7 @@ pub(crate) struct DescribedColumns {
     statements: Vec<Statement>,
     /// The machine of the map.
     pub(crate) machine: Machine,
-    /// Whether places without the letter of a machine (`P1`) are the compressor's beside those of the turbine (`P1T`).
+    /// Whether places without the letter of a machine (`P1`) are the compressor's next to those of the turbine (`P1T`).
     pub(crate) bare_is_compressor: bool,
 }
 

@@ -231,7 +231,7 @@ pub(crate) fn quantity_of_name(
         (Measured::Flow, Place::Turbine) => Some(Quantity::TurbineFlow),
         (Measured::Flow | Measured::VolumeFlow, _) => Some(Quantity::Flow),
         (Measured::Pressure, Place::Ambient) => Some(Quantity::Ambient),
-        // A set or computed state is no reading.
+        // A set or computed state was not measured.
         _ if read.is_command() || read.has(Word::Computed) => None,
         (measured, place) => channel_at(measured, place).and_then(Quantity::of_channel),
     }

@@ -72,7 +72,7 @@ pub(super) struct Notes {
 fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, ImportError> {
     let mut described = DescribedColumns::of(description, Machine::Compressor)?;
     match read_columns(grid, description, &described) {
-        // Beside `P1T`, which may be a total pressure, `P1` is the compressor's if the turbine's would be no compressor.
+        // Next to `P1T`, which may be a total pressure, `P1` is the compressor's if `P1T` cannot be.
         Err(error @ ImportError::NotACompressor { .. }) => {
             described.bare_is_compressor = true;
             read_columns(grid, description, &described).map_err(|_| error)

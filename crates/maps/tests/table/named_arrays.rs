@@ -44,7 +44,7 @@ fn assert_expected(found: &ImportedMap, what: &str) {
 fn documents_of_other_programs_are_maps() {
     let tables = json!({"flow": [[0.05, 0.06], [0.06, 0.07]], "pr": [[1.4, 1.3], [1.9, 1.8]], "eta": [[0.7, 0.68], [0.72, 0.71]]});
     for document in [
-        // Columns, with units beside them or in a list.
+        // Columns, with units next to them or in a list.
         json!({"speed": [6e4, 6e4, 9e4, 9e4], "flow": [0.05, 0.06, 0.06, 0.07], "PR": [1.4, 1.3, 1.9, 1.8], "eff": [0.7, 0.68, 0.72, 0.71]}),
         json!({"map": {"N": {"unit": "krpm", "values": [60, 60, 90, 90]}, "flow": {"unit": "g/s", "values": [50, 60, 60, 70]},
             "PR": {"values": [1.4, 1.3, 1.9, 1.8]}, "eta": {"unit": "%", "values": [70, 68, 72, 71]}}}),
@@ -93,7 +93,7 @@ fn documents_of_other_programs_are_maps() {
     let points = points(&read_json_map(&document, &MapDescription { design, ..given() }).unwrap());
     assert_eq!((points[0][0], points[2][0]), (45e3, 9e4));
     assert!((points[0][1] - 0.04).abs() < 1e-12 && (points[2][1] - 0.06).abs() < 1e-12, "{points:?}");
-    // What is no map is refused with a reason.
+    // Anything but a map is refused with a reason.
     let unknown = json!({"units": {"m": "slug/s"}, "N": [6e4, 9e4], "m": [0.05, 0.06], "PR": [1.4, 1.9]});
     assert!(read_json_map(&unknown, &given()).unwrap_err().to_string().contains("slug/s"));
     for document in [
@@ -137,7 +137,7 @@ fn variables_of_matlab_are_a_map() {
         let marks: Vec<f64> = found.map.surge.iter().map(|mark| mark.flow_corrected_kg_s).collect();
         assert_eq!(marks, [0.045, 0.055], "{speed}");
     }
-    // The map of the compressor beside that of the turbine, and that of the turbine alone.
+    // The map of the compressor together with that of the turbine, and that of the turbine alone.
     let turbine = [
         vector("turb.RPM", &[1500.0, 1500.0, 1900.0, 1900.0, 1900.0]),
         vector("turb.PR", &[1.3, 2.0, 1.3, 2.0, 2.5]),

@@ -97,7 +97,7 @@ fn columns_of_the_turbine_are_never_those_of_the_compressor() {
         (["Pc_in", "Tc_in", "Pc_out", "Tc_out"], ["Pt_in", "Tt_in", "Pt_out", "Tt_out"]),
         (["PT1C", "TT1C", "PT2C", "TT2C"], ["PT1T", "TT1T", "PT2T", "TT2T"]),
         (["P01C", "T01C", "P02C", "T02C"], ["P01T", "T01T", "P02T", "T02T"]),
-        // Alone `P1T` may be a total pressure; beside the compressor's `P1` it is the turbine's.
+        // Alone `P1T` may be a total pressure; next to the compressor's `P1` it is the turbine's.
         (["P1", "T1", "P2", "T2"], ["P1T", "T1T", "P2T", "T2T"]),
         (["P1", "T1", "P2", "T2"], ["PT1", "TT1", "PT2", "TT2"]),
     ] {
@@ -167,7 +167,7 @@ fn units_of_states_stand_anywhere_in_the_heading() {
     assert!((point.p1_pa - 97_600.0).abs() < 1e-6 && (point.p2_pa - 129_000.0).abs() < 1e-6, "{point:?}");
 }
 
-/// A set or computed value beside the reading is no reading, and a flow that the stand corrected is not corrected again.
+/// A set or computed value next to the reading is not used, and a flow that the stand corrected is not corrected again.
 #[test]
 fn set_and_computed_columns_are_no_readings() {
     let table = |names: &str| {

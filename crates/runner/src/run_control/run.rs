@@ -390,7 +390,7 @@ impl Run<'_, '_> {
             oil_temperature_k: soak.oil_temperature_k,
             ..setpoints(first)
         })?;
-        // A rest without a stated non-uniformity is no zero.
+        // Without a stated non-uniformity a rest does not count as a zero.
         let (name, kinds) = match soak.temperature_sigma_k > 0.0 {
             true => ("soak", [EventKind::SoakStarted, EventKind::SoakEnded]),
             false => ("rest", [EventKind::Note, EventKind::Note]),

@@ -56,36 +56,37 @@ impl MapOut<'_> {
     }
 }
 
-fn fitted_note(fitted: bool) -> &'static str {
-    if fitted { "; the format is a table, so the map was fitted" } else { "" }
+/// What was written: `kind` follows the numbers of points and lines, and `more` the keys that every map has.
+fn written(
+    (out, format): (MapOut<'_>, &MapFormat),
+    (points, lines): (usize, usize),
+    (is_fitted, fitted_here): (bool, bool),
+    (kind, more): (String, Value),
+) -> (Document, Value) {
+    let (file, name) = (out.path.display(), format.name);
+    let note = if fitted_here { "; the format is a table, so the map was fitted" } else { "" };
+    let mut document = Document::default();
+    document.text(format!("{file}: {name}, {points} points on {lines} speed lines, {kind}{note}"));
+    let mut json = json!({
+        "file": out.path, "format": name, "lines": lines, "points": points, "fitted": is_fitted,
+    });
+    if let (Some(json), Value::Object(more)) = (json.as_object_mut(), more) {
+        json.extend(more);
+    }
+    (document, json)
 }
 
-/// Writes a compressor map, fitted first if the format needs it, and says what was written.
+/// Writes a compressor map, fitted first if the format needs it.
 fn write_derived(
     map: CompressorMap,
     out: MapOut<'_>,
-    format: &'static MapFormat,
+    format: &MapFormat,
 ) -> Result<(Document, Value), SessionError> {
     let (map, fitted_here) = write_map_fitted_if_needed(out.path, format, map, out.existing)?;
-    let points: usize = map.lines.iter().map(|line| line.points.len()).sum();
-    let (lines, reference) = (map.lines.len(), map.reference);
-    let mut document = Document::default();
-    document.text(format!(
-        "{}: {}, {points} points on {lines} speed lines, corrected to {reference}{}",
-        out.path.display(),
-        format.name,
-        fitted_note(fitted_here)
-    ));
-    let json = json!({
-        "file": out.path,
-        "format": format.name,
-        "reference": reference,
-        "efficiency": map.efficiency,
-        "lines": lines,
-        "points": points,
-        "fitted": map.fitted.is_some(),
-    });
-    Ok((document, json))
+    let counts = (map.lines.iter().map(|line| line.points.len()).sum(), map.lines.len());
+    let more = json!({ "reference": map.reference, "efficiency": map.efficiency });
+    let kind = format!("corrected to {}", map.reference);
+    Ok(written((out, format), counts, (map.fitted.is_some(), fitted_here), (kind, more)))
 }
 
 pub(crate) fn warnings(path: &Path, remarks: &[ImportRemark]) -> Vec<String> {
@@ -233,22 +234,10 @@ impl Registry {
                     return Err(MapWorkError::NotOfTurbine { path: path.to_owned(), property }.into());
                 }
                 let (map, fitted_here) = write_turbine_fitted_if_needed(path, out, format, imported.map)?;
-                let (points, lines) = (map.points.len(), map.lines().count());
-                let mut document = Document::default();
-                document.text(format!(
-                    "{}: {}, turbine, {points} points on {lines} speed lines{}",
-                    out.path.display(),
-                    format.name,
-                    fitted_note(fitted_here)
-                ));
-                let json = json!({
-                    "file": out.path,
-                    "format": format.name,
-                    "machine": "turbine",
-                    "lines": lines,
-                    "points": points,
-                    "fitted": map.fitted.is_some(),
-                });
+                let counts = (map.points.len(), map.lines().count());
+                let of_turbine = ("turbine".to_owned(), json!({ "machine": "turbine" }));
+                let fitted = (map.fitted.is_some(), fitted_here);
+                let (document, json) = written((out, format), counts, fitted, of_turbine);
                 Ok(MapWork { document, json, warnings: warnings(path, &imported.remarks) })
             }
         }

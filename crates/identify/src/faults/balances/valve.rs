@@ -179,7 +179,7 @@ pub(crate) fn ln_area(readings: &Readings) -> f64 {
     (readings.flow_kg_s() / per_m2).ln()
 }
 
-/// Time before a jump whose readings are its start, s. Bound: shorter than any step, and longer than the noise.
+/// Time before a jump whose readings are its start, s. Bound: shorter than any step, and longer than the correlation of the noise, 2 s.
 const BEFORE_S: f64 = 3.0;
 /// Share of a step at its end that counts as the end of its jump. Bound: that of the search for a lag.
 const SETTLED_SHARE: f64 = 0.3;
@@ -191,12 +191,12 @@ const FOLLOWS: std::ops::Range<f64> = 0.5..2.0;
 const OWN_DELAY_S: f64 = 0.3;
 /// Error of all delays, one standard deviation, s and share of the declared one. Bound: the interval of a commissioning is a tenth of it.
 const COMMON_DELAY: (f64, f64) = (0.1, 0.2);
-/// Fewest jumps. Bound: a scatter has a meaning.
+/// Fewest jumps. Bound: the median deviation of three says little of their scatter.
 const MIN_JUMPS: usize = 4;
 /// Standard deviation over the median absolute deviation of a normal distribution. Source: definition.
 const MAD_RATIO: f64 = 1.4826;
 
-/// The rows of each actuator; none in recordings of other programs, whose commands mean anything. `outlet_volume_m3`: before the valve, 0 if unknown.
+/// The rows of each actuator; none in recordings of other programs, whose commands may have any meaning. `outlet_volume_m3`: before the valve, 0 if unknown.
 pub(crate) fn motion_rows(
     recording: &Recording,
     config: &IdentifyConfig,

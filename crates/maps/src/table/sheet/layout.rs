@@ -248,7 +248,7 @@ pub(crate) fn columns(described: &DescribedColumns, cells: &[String]) -> Result<
     }
     let has = |quantity: Quantity| all.iter().any(|column| column.quantity == quantity);
     let is_map = has(Quantity::PressureRatio);
-    // Readings are corrected here, so that a corrected flow beside them would be corrected twice.
+    // Readings are corrected here, so that a corrected flow among them would be corrected twice.
     let is_measured = !is_map && (has(Quantity::P2) || has(Quantity::P3));
     all.retain(|column| {
         !(is_measured

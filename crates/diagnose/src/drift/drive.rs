@@ -6,6 +6,7 @@ use mapper_core::{Channel, Dimension, Recording};
 use mapper_numerics::parallel;
 use mapper_observe::averages::{BEFORE_S, OUTPUTS, estimate_state, mean_between};
 use mapper_observe::model_inputs::averaged_inputs::AveragedInputs;
+use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_observe::perturbation::Perturbation;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::true_value;
@@ -75,7 +76,8 @@ impl<'a> Drive<'a> {
             return Err(DriftError::NoSteps { run });
         };
         let (model, nominal) = (request.model, &request.boundary);
-        let inputs = AveragedInputs::read(recording, nominal, &recording.steps)
+        let valve = Response::of_valve(request.actuators.as_ref());
+        let inputs = AveragedInputs::read(recording, (nominal, valve), &recording.steps)
             .map_err(|source| DriftError::Inputs { run, source })?;
         let before_s = request.identification.thresholds.end_mean_s;
         let start = start_state((run, recording), model, &inputs, first.start_s, before_s)?;

@@ -3,7 +3,8 @@
 use crate::drift::causes::Cause;
 use mapper_core::unit_factors::S_PER_H;
 use mapper_core::{
-    Channel, Implausible, ModelTolerances, NoiseColour, Recording, StepPoint, check_running, step_number,
+    Channel, Implausible, ModelTolerances, NoiseColour, Recording, RigActuators, StepPoint, check_running,
+    step_number,
 };
 use mapper_identify::{IdentifyConfig, LONGEST_BRIDGE_S};
 use mapper_numerics::coloured_noise::ColouredNoise;
@@ -158,6 +159,8 @@ pub struct DriftRequest<'a> {
     pub tolerances: ModelTolerances,
     /// Declared uncertainty, window, geometry.
     pub identification: &'a IdentifyConfig,
+    /// Declared motion of the actuators.
+    pub actuators: Option<RigActuators>,
 }
 
 impl DriftRequest<'_> {
@@ -168,7 +171,7 @@ impl DriftRequest<'_> {
             tolerances: self.tolerances,
             nominal: self.boundary,
             common_offsets: Vec::new(),
-            actuators: None,
+            actuators: self.actuators,
         }
     }
 }

@@ -328,7 +328,7 @@ fn found_drift(rig: &RigRecording) -> Option<DriftReport> {
     if !rig.has_drift_search {
         return None;
     }
-    let RigRecording { recording, model, identification, boundary, tolerances, .. } = rig;
+    let RigRecording { recording, model, identification, boundary, tolerances, actuators, .. } = rig;
     let zero = ZeroOutcome::of(recording, identification, rig.zero.map(Into::into));
     let (recording, _) = zero.subtract(recording.clone(), identification.clone());
     let report = drift::diagnose(&DriftRequest {
@@ -337,6 +337,7 @@ fn found_drift(rig: &RigRecording) -> Option<DriftReport> {
         boundary: *boundary,
         tolerances: *tolerances,
         identification,
+        actuators: *actuators,
     });
     report.ok().filter(|report| !report.drifts.is_empty())
 }

@@ -4,8 +4,8 @@
 
 use crate::drift::common;
 
-use common::{Planted, campaign, drift_reading, judge, judge_all};
-use mapper_core::Channel;
+use common::{Planted, campaign, campaign_with_play, drift_reading, judge, judge_all, judge_on};
+use mapper_core::{ActuatorMotion, Channel, RigActuators};
 use mapper_diagnose::drift::{
     Alternative, Cause, DriftReport, DriftVerdict, FoundDrift, RATE_PER_H, RateOrStep, RecordedRun,
 };
@@ -40,6 +40,15 @@ fn a_drift_free_campaign_is_not_flagged_and_prints_its_limits() {
     assert!(limit(&report, Cause::Sensors(&[Channel::CompressorFlow])) <= 0.003);
     assert!(limit(&report, Cause::Sensors(&[Channel::TurbineFlow])) <= 0.003);
     assert_eq!(report.groups[0].visits.len(), 4);
+}
+
+/// Play of 2 % leaves the valve 1 % above or below its command, from where it came: repeats of one point differ in flow and P2, and nothing drifts.
+#[test]
+fn declared_play_of_the_valve_is_no_drift() {
+    let at_once = ActuatorMotion { lag_s: 0.0, rate_per_s: f64::INFINITY, dead_time_s: 0.0 };
+    let actuators = RigActuators { valve: at_once, valve_play_ratio: 0.02, ..RigActuators::FAST_VALVE };
+    let report = judge_on(&campaign_with_play(11, None, 0.02).recording, actuators);
+    assert_eq!((report.verdict, report.drifts.len()), (DriftVerdict::None, 0), "{}", report.reason);
 }
 
 #[test]

@@ -56,15 +56,15 @@ impl Inputs for AveragedInputs {
 
 impl AveragedInputs {
     /// The inputs of a recording during `steps` (rising in time, each with the commands it holds). `nominal` replaces channels that are not
-    /// recorded.
+    /// recorded, and the valve has the play and the dead band of `declared_valve`.
     pub fn read(
         recording: &Recording,
-        nominal: &BoundaryConditions,
+        (nominal, declared_valve): (&BoundaryConditions, Response),
         steps: &[StepMarker],
     ) -> Result<AveragedInputs, InputsError> {
         let mut inputs = AveragedInputs { starts_s: Vec::new(), levels: Vec::new() };
         let levels: Vec<_> = steps.iter().map(|step| levels_of_step(recording, step)).collect();
-        let valve = valve_response(recording, nominal);
+        let valve = valve_response(recording, nominal, declared_valve);
         let command =
             LaggedCommand::new(levels.iter().flatten().copied().collect(), Response::lag(0.0), valve);
         for (index, (step, levels)) in steps.iter().zip(&levels).enumerate() {
@@ -84,13 +84,13 @@ impl AveragedInputs {
     }
 }
 
-/// Response of the valve, from the recording. It is immediate if it is unknown or slower than any valve, which indicates a lag of the flow
-/// meter.
-fn valve_response(recording: &Recording, nominal: &BoundaryConditions) -> Response {
-    let measured = Table::new(recording).and_then(|table| {
-        measured_valve_response(&table, recording, (nominal.p1_pa, 0.0), Response::lag(0.0))
-    });
-    measured.filter(|valve| valve.lag_s < MAX_VALVE_LAG_S).unwrap_or(Response::lag(0.0))
+/// Response of the valve, from the recording, with its declared play and dead band. It is immediate if it is unknown or slower than any undeclared
+/// valve, which indicates a lag of the flow meter.
+fn valve_response(recording: &Recording, nominal: &BoundaryConditions, declared: Response) -> Response {
+    let measured = Table::new(recording)
+        .and_then(|table| measured_valve_response(&table, recording, (nominal.p1_pa, 0.0), declared));
+    let slowest_s = declared.lag_s.max(MAX_VALVE_LAG_S);
+    measured.filter(|valve| valve.lag_s < slowest_s).unwrap_or(declared)
 }
 
 struct Nodes<'a> {
@@ -198,7 +198,7 @@ mod tests {
             p3_pa,
             valve_opening_ratio,
         });
-        let inputs = AveragedInputs::read(&recording, &nominal, &steps).unwrap();
+        let inputs = AveragedInputs::read(&recording, (&nominal, Response::lag(0.0)), &steps).unwrap();
         for t_s in (0..590).map(|tenth| jump_s + 0.95 + 0.1 * f64::from(tenth)) {
             let off_pa = inputs.at(t_s).p3_pa - p3_pa(t_s);
             assert!(off_pa.abs() < 20.0, "{off_pa} Pa off {} s after the jump", t_s - jump_s);
@@ -247,8 +247,12 @@ mod tests {
             steps,
             ..Recording::default()
         };
-        let inputs =
-            AveragedInputs::read(&recording, &BoundaryConditions::default(), &recording.steps).unwrap();
+        let inputs = AveragedInputs::read(
+            &recording,
+            (&BoundaryConditions::default(), Response::lag(0.0)),
+            &recording.steps,
+        )
+        .unwrap();
         for since_s in [0.5, 1.0, 1.5, 2.5, 10.0] {
             let off = inputs.at(40.0 + since_s).valve_opening_ratio - truth(40.0 + since_s);
             // A twentieth of the jump: the orifice flow resolves the opening no better while it moves.

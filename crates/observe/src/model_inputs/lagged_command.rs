@@ -1,7 +1,7 @@
 //! Response of P3 and the valve to their commands: a dead time, a first-order lag, a rate limit and play, and their estimation from a recording.
 
 use crate::averages::{TIME_ROUNDING_S, Table};
-use mapper_core::{Channel, Recording, Series, StepMarker, is_jump, is_same_command};
+use mapper_core::{Channel, Recording, RigActuators, Series, StepMarker, is_jump, is_same_command};
 use mapper_numerics::root::minimise;
 use mapper_numerics::statistics::{mean, median};
 use mapper_physics::gas::mixture::Gas;
@@ -55,6 +55,17 @@ impl Response {
     /// A lag alone.
     pub const fn lag(lag_s: f64) -> Response {
         Response { lag_s, slew_per_s: f64::INFINITY, dead_time_s: 0.0, play: 0.0, dead_band: 0.0 }
+    }
+
+    /// The declared motion of a valve; at once if none is declared.
+    pub fn of_valve(declared: Option<&RigActuators>) -> Response {
+        declared.map_or(Response::lag(0.0), |actuators| Response {
+            lag_s: actuators.valve.lag_s,
+            slew_per_s: actuators.valve.rate_per_s,
+            dead_time_s: actuators.valve.dead_time_s,
+            play: actuators.valve_play_ratio,
+            dead_band: actuators.valve_dead_band_ratio,
+        })
     }
 
     /// Position of the output, which was at `before`, behind a drive.

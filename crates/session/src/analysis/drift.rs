@@ -76,6 +76,7 @@ impl Session<'_> {
             boundary: campaign.boundary,
             tolerances: campaign.tolerances,
             identification: &config,
+            actuators: campaign.actuators,
         })?;
         Ok(Drift { report, sensors, zero })
     }

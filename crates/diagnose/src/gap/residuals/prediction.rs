@@ -283,10 +283,9 @@ impl Study {
             |index, output, reading, circumstances| {
                 delay_s = circumstances.delay_s;
                 missed_ratio = circumstances.missed_ratio;
-                let Some((step, block)) = self.places[index] else { return };
+                let Some((step, block, share)) = self.places[index] else { return };
                 let Some(row) = self.rows[step][block][output] else { return };
-                let single = self.steps[step].blocks[block].spread_s == 0.0;
-                values[row as usize] += if single { reading } else { 0.5 * reading };
+                values[row as usize] += share * reading;
             },
         )?;
         let slopes = self.slopes(&values);
@@ -394,7 +393,7 @@ impl Study {
     ) -> Result<Vec<Vec<(f64, f64)>>, PredictError> {
         let mut positions = vec![Vec::new(); self.steps.len()];
         self.drive(hypothesis, &self.times_s, |index, _, _, outputs| {
-            if let Some((step, block)) = self.places[index] {
+            if let Some((step, block, _)) = self.places[index] {
                 let since_s = self.steps[step].blocks[block].since_jump_s;
                 positions[step].push((since_s, outputs.surge_position_ratio));
             }

@@ -67,6 +67,9 @@ pub enum PredictError {
     Effect(#[from] EffectError),
 }
 
+/// Step and block of a read of the model, and its share of the block's mean.
+type BlockShare = (usize, usize, f64);
+
 /// One prepared recording.
 #[derive(Debug, Clone)]
 pub struct Study {
@@ -102,10 +105,10 @@ pub struct Study {
     pub scatter_s: f64,
     pub(crate) rested: bool,
     pub(crate) grid: FrozenGrid,
-    /// Times at which the model is evaluated: two per block, and one at each jump.
+    /// Times at which the model is evaluated: two per block, more in a ramp, and one at each jump.
     pub(crate) times_s: Vec<f64>,
-    /// Step and block of each time; `None` at a jump.
-    pub(crate) places: Vec<Option<(usize, usize)>>,
+    /// Step and block of each time, and its share of the block's mean; `None` at a jump.
+    pub(crate) places: Vec<Option<BlockShare>>,
     pub(crate) rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>>,
     /// For each group the noise of the subtracted values, unit squared; empty if nothing was subtracted.
     pub(crate) other_noise: Vec<DMatrix<f64>>,
@@ -130,6 +133,25 @@ const AFTER_JUMP: Schedule = Schedule {
 const RAMP: Schedule = Schedule { lengths_s: &[(1.0, 0.2), (3.0, 0.5), (f64::INFINITY, 1.0)], ..SLOW };
 /// Ramps up to this length count as jumps, s. Bound: until then the blocks after a jump are those of a ramp.
 const SHORT_RAMP_S: f64 = 3.0;
+
+/// Reads of a block of a ramp. Bound: an actuator turns its slope with each command, several times a second, which two points miss.
+const READS_IN_RAMP: usize = 5;
+
+/// Times at which the model is read for a block, s: their mean is that of the samples, and so is the spread of two.
+fn times_of_block(block: &Block, in_ramp: bool) -> Vec<f64> {
+    let Block { mean_s, spread_s, ref samples, .. } = *block;
+    if spread_s == 0.0 {
+        return vec![mean_s];
+    }
+    if !in_ramp {
+        return vec![mean_s - spread_s, mean_s + spread_s];
+    }
+    let count = READS_IN_RAMP.min(samples.len());
+    // Evenly spaced points from -1 to 1 have the spread sqrt((n + 1) / (3 (n - 1))).
+    let farthest_s = spread_s / ((count + 1) as f64 / (3 * (count - 1)) as f64).sqrt();
+    let place = |i: usize| mean_s + farthest_s * (2.0 * i as f64 / (count - 1) as f64 - 1.0);
+    (0..count).map(place).collect()
+}
 
 fn blocks_of_ramp(table: &Table, (start_s, ramp_end_s, end_s): (f64, f64, f64)) -> Vec<Block> {
     let mut of_step = blocks(table, start_s, ramp_end_s.min(end_s), &RAMP);
@@ -258,18 +280,16 @@ impl Study {
                 }
             }
         }
-        let mut reads: Vec<(f64, Option<(usize, usize)>)> = Vec::new();
-        for (step_index, step) in steps.iter().enumerate() {
+        let mut reads: Vec<(f64, Option<BlockShare>)> = Vec::new();
+        for (step_index, (step, marker)) in steps.iter().zip(&recording.steps).enumerate() {
             if step.jumped {
                 reads.push((times.starts_s[step_index], None));
             }
+            let ramp_end_s = if step.ramped { ramp_end_s(recording, marker) } else { f64::NEG_INFINITY };
             for (block_index, block) in step.blocks.iter().enumerate() {
-                // The mean of the two one-sigma ends has the mean and the spread of the samples.
-                let place = Some((step_index, block_index));
-                reads.push((block.mean_s - block.spread_s, place));
-                if block.spread_s > 0.0 {
-                    reads.push((block.mean_s + block.spread_s, place));
-                }
+                let times_s = times_of_block(block, block.mean_s < ramp_end_s);
+                let place = Some((step_index, block_index, 1.0 / times_s.len() as f64));
+                reads.extend(times_s.into_iter().map(|t_s| (t_s, place)));
             }
         }
         reads.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -122,13 +122,7 @@ impl Actuators {
         judged: bool,
     ) -> Actuators {
         let (p3, timed) = timed_p3(table, recording, declared);
-        let valve = declared.actuators.map_or(Response::lag(0.0), |actuators| Response {
-            lag_s: actuators.valve.lag_s,
-            slew_per_s: actuators.valve.rate_per_s,
-            dead_time_s: actuators.valve.dead_time_s,
-            play: actuators.valve_play_ratio,
-            dead_band: actuators.valve_dead_band_ratio,
-        });
+        let valve = Response::of_valve(declared.actuators.as_ref());
         let outlet = (declared.nominal.p1_pa, model.params.outlet.volume_m3);
         let measured = || measured_valve_response(table, &timed, outlet, valve);
         let valve = if judged { valve } else { measured().unwrap_or(valve) };

@@ -3,8 +3,8 @@
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{
-    Channel, DeclaredUncertainty, ModelTolerances, NoiseColour, Recording, ReferenceState, Series, StepKind,
-    StepMarker,
+    Channel, DeclaredUncertainty, ModelTolerances, NoiseColour, Recording, ReferenceState, RigActuators,
+    Series, StepKind, StepMarker,
 };
 use mapper_diagnose::drift::{Cause, DriftReport, DriftRequest, RecordedRun, diagnose};
 use mapper_identify::{IdentifyConfig, WindowRule};
@@ -165,6 +165,11 @@ impl Inputs for Cell {
 
 /// A whole campaign.
 pub fn campaign(seed: u64, planted: Option<Planted>) -> Campaign {
+    campaign_with_play(seed, planted, 0.0)
+}
+
+/// A whole campaign whose valve stays behind its drive by half of `play_ratio`, on the side from which it comes.
+pub fn campaign_with_play(seed: u64, planted: Option<Planted>, play_ratio: f64) -> Campaign {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let base = nominal();
@@ -189,12 +194,14 @@ pub fn campaign(seed: u64, planted: Option<Planted>) -> Campaign {
     // The rig is commanded open loop: the P3 that the nominal machine needs.
     let visits = schedule();
     let mut levels: Vec<(f64, f64, f64)> = Vec::new();
+    let mut position = 1.0_f64;
     let mut steps: Vec<StepMarker> = Vec::new();
     for (index, (speed_rpm, valve)) in visits.iter().enumerate() {
         let boundary = BoundaryConditions { valve_opening_ratio: *valve, ..BoundaryConditions::default() };
         let p3_pa = hold_speed(&base, *speed_rpm, &boundary).unwrap().boundary.p3_pa;
         let start_s = if index == 0 { 0.0 } else { HOLD_S + DWELL_S * index as f64 };
-        levels.push((start_s, p3_pa, *valve));
+        position = position.clamp(valve - 0.5 * play_ratio, valve + 0.5 * play_ratio);
+        levels.push((start_s, p3_pa, position));
         steps.push(StepMarker {
             index,
             kind: StepKind::Point,
@@ -306,21 +313,31 @@ pub fn judge(recording: &Recording) -> DriftReport {
 
 /// The same, points identified otherwise.
 pub fn judge_by(recording: &Recording, identification: &IdentifyConfig) -> DriftReport {
-    ask(&[RecordedRun { recording, fingerprint: None }], identification)
+    ask(&[RecordedRun { recording, fingerprint: None }], identification, None)
 }
 
 /// Verdict on several recordings.
 pub fn judge_all(runs: &[RecordedRun<'_>]) -> DriftReport {
-    ask(runs, &identification())
+    ask(runs, &identification(), None)
 }
 
-fn ask(runs: &[RecordedRun<'_>], identification: &IdentifyConfig) -> DriftReport {
+/// Verdict on one recording of a stand with these actuators.
+pub fn judge_on(recording: &Recording, actuators: RigActuators) -> DriftReport {
+    ask(&[RecordedRun { recording, fingerprint: None }], &identification(), Some(actuators))
+}
+
+fn ask(
+    runs: &[RecordedRun<'_>],
+    identification: &IdentifyConfig,
+    actuators: Option<RigActuators>,
+) -> DriftReport {
     diagnose(&DriftRequest {
         runs,
         model: &nominal(),
         boundary: BoundaryConditions::default(),
         tolerances: ModelTolerances::default(),
         identification,
+        actuators,
     })
     .unwrap()
 }

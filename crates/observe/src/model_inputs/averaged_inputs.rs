@@ -3,20 +3,32 @@
 //! In contrast to [`smoothed_inputs`](crate::model_inputs::smoothed_inputs), these keep the noise of means, which is independent between
 //! segments, and follow a step of an input sensor. The search for drift needs both properties.
 
-use crate::averages::{BEFORE_S, INPUT_CHANNELS, Schedule, Table, boundary_condition};
+use crate::averages::{BEFORE_S, INPUT_CHANNELS, Schedule, TIME_ROUNDING_S, Table, boundary_condition};
 use crate::model_inputs::lagged_command::{
-    LaggedCommand, Response, commanded_s, levels_of_step, measured_valve_response,
+    LaggedCommand, Response, commanded_s, levels_of_step, measured_valve_response, settled, valve_areas_m2,
 };
 use mapper_core::{Channel, Recording, StepMarker};
-use mapper_numerics::statistics::mean;
+use mapper_numerics::root::minimise;
+use mapper_numerics::statistics::{mean, median};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::steady::{Inputs, InputsError, InterpolatedInputs};
+use std::collections::BTreeMap;
 
 /// Time after a jump for which readings are not averaged, s. Bound: actuators need some tenths.
 const RAW_S: f64 = 3.0;
 /// Maximum lag that is attributed to the valve, s. Bound: pneumatic and electric actuators of this size need 0.1 to 1 s, flow meters up
 /// to several seconds.
 const MAX_VALVE_LAG_S: f64 = 1.5;
+/// Openings closer than this are one command. Bound: the read-back of a command varies in its last digits.
+const SAME_OPENING_RATIO: f64 = 1e-3;
+/// Maximum play that is sought. Bound: a drive with more is broken.
+const MAX_PLAY_RATIO: f64 = 0.1;
+/// Intervals of the coarse search for play. Bound: half a per cent apart, a quarter of the play of a worn positioner.
+const PLAYS: u32 = 20;
+/// Tolerance of the play. Bound: a tenth of what moves an output by its noise.
+const PLAY_TOLERANCE: f64 = 1e-4;
+/// Logarithm of the likelihood of Laplacian deviations that play must gain. Bound: one of ten thousand recordings without play gains as much.
+const MIN_PLAY_GAIN: f64 = 9.2;
 /// Averaging times after the raw readings. Each is at least as long as the time step of the model. Bound: a speed-control loop corrects
 /// P3 by a per cent within ten seconds of the jump, and the means must follow this.
 const AFTER_JUMP: Schedule = Schedule {
@@ -84,13 +96,49 @@ impl AveragedInputs {
     }
 }
 
-/// Response of the valve, from the recording, with its declared play and dead band. It is immediate if it is unknown or slower than any undeclared
-/// valve, which indicates a lag of the flow meter.
+/// Response of the valve, from the recording, with its declared dead band and the play that repeats of an opening show. It is immediate if it is
+/// unknown or slower than any undeclared valve, which indicates a lag of the flow meter.
 fn valve_response(recording: &Recording, nominal: &BoundaryConditions, declared: Response) -> Response {
-    let measured = Table::new(recording)
-        .and_then(|table| measured_valve_response(&table, recording, (nominal.p1_pa, 0.0), declared));
+    let Some(table) = Table::new(recording) else { return declared };
+    let declared = Response { play: shown_play(&table, recording, nominal, declared), ..declared };
     let slowest_s = declared.lag_s.max(MAX_VALVE_LAG_S);
-    measured.filter(|valve| valve.lag_s < slowest_s).unwrap_or(declared)
+    measured_valve_response(&table, recording, (nominal.p1_pa, 0.0), declared)
+        .filter(|valve| valve.lag_s < slowest_s)
+        .unwrap_or(declared)
+}
+
+/// Play with which the areas that flow and pressures show at the ends of the steps agree best, relative to the predicted openings, between repeats of
+/// one command; the declared play unless more is better than chance.
+fn shown_play(table: &Table, recording: &Recording, nominal: &BoundaryConditions, declared: Response) -> f64 {
+    let Some(areas_m2) = valve_areas_m2(table, (nominal.p1_pa, 0.0)) else { return declared.play };
+    let areas_m2: Vec<Option<f64>> =
+        recording.steps.iter().map(|step| settled(table, step, &areas_m2)).collect();
+    let spread = |more: f64| {
+        let valve = Response { play: declared.play + more, ..declared };
+        let command = LaggedCommand::of_recording(recording, Response::lag(0.0), valve);
+        let mut differences: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
+        for (step, area_m2) in recording.steps.iter().zip(&areas_m2) {
+            let Some(area_m2) = area_m2.filter(|area_m2| *area_m2 > 0.0) else { continue };
+            let command_key = (step.valve_opening_ratio / SAME_OPENING_RATIO).round() as i64;
+            let predicted = command.valve_opening_ratio(step.end_s - TIME_ROUNDING_S);
+            differences.entry(command_key).or_default().push((area_m2 / predicted).ln());
+        }
+        // Absolute deviations, because areas at low pressure ratios scatter more.
+        let deviations = differences.values().filter(|repeats| repeats.len() > 1).flat_map(|repeats| {
+            let middle = median(repeats).unwrap_or(0.0);
+            repeats.iter().map(move |difference| (difference - middle).abs())
+        });
+        deviations.fold((0, 0.0), |(count, sum), deviation| (count + 1, sum + deviation))
+    };
+    let coarse = (0..=PLAYS).map(|i| MAX_PLAY_RATIO * f64::from(i) / f64::from(PLAYS));
+    let Some(coarse) = coarse.min_by(|a, b| spread(*a).1.total_cmp(&spread(*b).1)) else {
+        return declared.play;
+    };
+    let apart = MAX_PLAY_RATIO / f64::from(PLAYS);
+    let best = minimise((coarse - apart).max(0.0), coarse + apart, PLAY_TOLERANCE, |more| spread(more).1);
+    let (count, without) = spread(0.0);
+    let gained = f64::from(count) * (without / best.value.max(f64::MIN_POSITIVE)).ln();
+    if count > 0 && gained > MIN_PLAY_GAIN { declared.play + best.at } else { declared.play }
 }
 
 struct Nodes<'a> {

@@ -340,6 +340,24 @@ pub fn valve_areas_m2(table: &Table, (nominal_p1_pa, outlet_volume_m3): (f64, f6
     Some(area_m2.collect())
 }
 
+/// Median of a quantity of the samples at the settled end of a step; `None` without values.
+pub(crate) fn settled(table: &Table, step: &StepMarker, values: &[f64]) -> Option<f64> {
+    let range = table.range(step.end_s - SETTLED_SHARE * (step.end_s - step.start_s), step.end_s);
+    median(values[range].iter().filter(|value| value.is_finite()))
+}
+
+/// Opening of the valve at each sample: its area, relative to the median area per commanded opening.
+pub(crate) fn valve_openings(
+    table: &Table,
+    recording: &Recording,
+    (nominal_p1_pa, outlet_volume_m3): (f64, f64),
+) -> Option<Vec<f64>> {
+    let areas_m2 = valve_areas_m2(table, (nominal_p1_pa, outlet_volume_m3))?;
+    let per_opening = |step: &StepMarker| Some(settled(table, step, &areas_m2)? / step.valve_opening_ratio);
+    let area_m2 = median(recording.steps.iter().filter_map(per_opening).filter(|area_m2| *area_m2 > 0.0))?;
+    area_m2.is_finite().then(|| areas_m2.iter().map(|at| at / area_m2).collect())
+}
+
 /// Response of the valve to its command, from flow and pressures: orifice flow is proportional to its area, and the volume before it takes a part
 /// of the flow while P2 changes (`outlet_volume_m3`; 0 if it is unknown). `None` without jumps of the valve, flow, P2 or T2. A lag of the flow
 /// meter counts as one of the valve. Play and dead band are those `declared`.
@@ -349,26 +367,13 @@ pub fn measured_valve_response(
     (nominal_p1_pa, outlet_volume_m3): (f64, f64),
     declared: Response,
 ) -> Option<Response> {
-    let openings = valve_areas_m2(table, (nominal_p1_pa, outlet_volume_m3))?;
+    let openings = valve_openings(table, recording, (nominal_p1_pa, outlet_volume_m3))?;
     let openings_of = |pair: &[StepMarker]| (pair[0].valve_opening_ratio, pair[1].valve_opening_ratio);
     let jumping = || {
         let jumped = |(from, to): (f64, f64)| is_jump(Channel::ValveCommand, from, to);
         recording.steps.windows(2).filter(move |pair| jumped(openings_of(pair)))
     };
     let jumps: Vec<f64> = jumping().map(|pair| pair[1].start_s).collect();
-    // Convert areas to openings, with the median ratio at the settled ends of the steps.
-    let mut areas: Vec<f64> = recording
-        .steps
-        .iter()
-        .filter_map(|step| {
-            let range = table.range(step.end_s - SETTLED_SHARE * (step.end_s - step.start_s), step.end_s);
-            Some(median(openings[range].iter().filter(|x| x.is_finite()))? / step.valve_opening_ratio)
-        })
-        .filter(|area| area.is_finite() && *area > 0.0)
-        .collect();
-    areas.sort_by(f64::total_cmp);
-    let area_m2 = *areas.get(areas.len() / 2)?;
-    let openings: Vec<f64> = openings.iter().map(|x| x / area_m2).collect();
     let sizes: Vec<f64> = jumping().map(openings_of).map(|(from, to)| (to - from).abs()).collect();
     let commanded = LaggedCommand::of_recording(recording, Response::lag(0.0), Response::lag(0.0));
     let predict = |response: Response| {

@@ -322,8 +322,8 @@ pub fn judge_all(runs: &[RecordedRun<'_>]) -> DriftReport {
 }
 
 /// Verdict on one recording of a stand with these actuators.
-pub fn judge_on(recording: &Recording, actuators: RigActuators) -> DriftReport {
-    ask(&[RecordedRun { recording, fingerprint: None }], &identification(), Some(actuators))
+pub fn judge_on(recording: &Recording, actuators: Option<RigActuators>) -> DriftReport {
+    ask(&[RecordedRun { recording, fingerprint: None }], &identification(), actuators)
 }
 
 fn ask(

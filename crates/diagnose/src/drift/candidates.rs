@@ -47,7 +47,8 @@ impl Candidates {
         let observable: Vec<(Cause, Response)> =
             Cause::all().into_iter().filter_map(|cause| Some((cause, readings.signature(cause)?))).collect();
         let (start_s, end_s) = readings.span_s();
-        let histories = time_histories(start_s, end_s, ONSETS);
+        let mut histories = time_histories(start_s, end_s, ONSETS);
+        histories.retain(|history| readings.is_seen(history));
         let mut all: Vec<DatedCause> = (0..observable.len())
             .flat_map(|cause| histories.iter().map(move |history| DatedCause { cause, history: *history }))
             .collect();
@@ -59,7 +60,9 @@ impl Candidates {
             let shifts_s = (0..2 * FINE_PER_GRID).map(|part| ((part as f64 + 0.5) / fine - 1.0) * spacing_s);
             let onsets_s = shifts_s.map(|by_s| history.onset + by_s).chain([history.onset]);
             let within = onsets_s.filter(|onset_s| (start_s..end_s).contains(onset_s));
-            all.extend(within.map(|onset| DatedCause { cause, history: TimeHistory { onset, ..*history } }));
+            let dated = within.map(|onset| TimeHistory { onset, ..*history });
+            let seen = dated.filter(|history| readings.is_seen(history));
+            all.extend(seen.map(|history| DatedCause { cause, history }));
         }
         if all.is_empty() {
             return Err(Unsolvable::NothingShows);
@@ -177,6 +180,11 @@ impl LowRank {
     /// Posterior variance of a linear function of the constants.
     pub(super) fn variance(&self, weights: &DVector<f64>) -> f64 {
         weights.dot(&self.inner.solve(weights))
+    }
+
+    /// ln of the determinant of the covariance, whitened by D.
+    pub(super) fn ln_determinant(&self) -> f64 {
+        self.inner.ln_determinant()
     }
 
     /// Degrees of freedom used by the constants: the trace of the projection onto them.

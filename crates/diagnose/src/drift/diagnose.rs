@@ -35,7 +35,9 @@ pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
     if let Some(reason) = runs::refusal(request.runs, &steps, &groups) {
         return Ok(DriftReport::without_verdict(reason));
     }
-    let (readings, mut drives) = read(request, &recordings, steps)?;
+    let first_visits = groups.iter().filter_map(|visits| steps.get(*visits.first()?));
+    let unseen_before_s = first_visits.map(|step| step.end_s + step.offset_s).reduce(f64::min);
+    let (readings, mut drives) = read(request, &recordings, (steps, unseen_before_s))?;
     let declared = request.declared();
     let own = own_covariances(&recordings, &readings, &declared);
     let refined = Refinement::new(readings, &own, &mut drives, &declared)?;
@@ -46,7 +48,7 @@ pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
 fn read<'a>(
     request: &DriftRequest<'a>,
     recordings: &[&Recording],
-    steps: Vec<CampaignStep>,
+    (steps, unseen_before_s): (Vec<CampaignStep>, Option<f64>),
 ) -> Result<(Readings, Vec<Drive<'a>>), DriftError> {
     for (run, recording) in recordings.iter().enumerate() {
         usable(run, recording, request.identification.thresholds.lost_samples_ratio)?;
@@ -96,6 +98,7 @@ fn read<'a>(
         input_levels: INPUT_CHANNELS.into_iter().filter_map(level).collect(),
         columns,
         steps,
+        unseen_before_s,
         kept,
         all,
     };
@@ -133,8 +136,6 @@ pub(crate) fn conclude(
     let decision = &refined.decision;
     let points: Vec<Vec<IdentifiedPoint>> =
         recordings.iter().map(|recording| identified(recording, request)).collect();
-    let first_visits = groups.iter().filter_map(|visits| refined.readings.steps.get(*visits.first()?));
-    let unseen_before_s = first_visits.map(|step| step.end_s + step.offset_s).reduce(f64::min);
     let groups =
         groups.iter().map(|visits| group(request, recordings, &refined.readings, &points, visits)).collect();
     let drifts: Vec<FoundDrift> =
@@ -147,7 +148,7 @@ pub(crate) fn conclude(
         reason: reason(decision, &drifts, verdict),
         drifts,
         alone: decision.alone.clone(),
-        unseen_before_s,
+        unseen_before_s: refined.readings.unseen_before_s,
         detection_limits: decision.limits.clone(),
         groups,
         corrected_points,

@@ -4,7 +4,7 @@ use crate::drift::causes::{Cause, Drift, FOULING_FLOW_SHARE, is_relative};
 use crate::drift::drive::{PERTURBATIONS, Prediction, difference_step};
 use crate::drift::runs::{CampaignStep, Segment};
 use mapper_core::Channel;
-use mapper_inference::hypotheses::TimeHistory;
+use mapper_inference::hypotheses::{Shape, TimeHistory};
 use mapper_observe::averages::{INPUT_CHANNELS, OUTPUTS};
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
@@ -26,6 +26,8 @@ pub(crate) struct SegmentMeans {
 pub(crate) struct Readings {
     pub runs: usize,
     pub steps: Vec<CampaignStep>,
+    /// End of the first visit of a repeated point, campaign time, s: an earlier change is in every visit. `None` without repeats.
+    pub unseen_before_s: Option<f64>,
     /// The compared segments.
     pub segments: Vec<Segment>,
     /// Compared channels, as positions in [`OUTPUTS`].
@@ -123,6 +125,11 @@ impl Readings {
         })
     }
 
+    /// Whether a cause can have such a history: a step before the end of the first visit is a constant to all repeats.
+    pub(super) fn is_seen(&self, history: &TimeHistory) -> bool {
+        history.shape != Shape::Step || self.unseen_before_s.is_none_or(|end_s| history.onset >= end_s)
+    }
+
     pub(super) fn mean_of(&self, row: usize, history: TimeHistory) -> f64 {
         let segment = &self.segments[row / self.columns.len()];
         let offset_s = self.steps[segment.step].offset_s;
@@ -213,8 +220,9 @@ fn own_deviation(channel: Channel, reading: f64) -> f64 {
     }
 }
 
-/// Responses to all constants of a campaign, each of one standard deviation.
-pub(crate) fn constants(readings: &Readings, declared: &Declared) -> Vec<Response> {
+/// Responses to all constants of a campaign, each of one standard deviation. `own_factor`: size of the deviations of each operating point and of the
+/// slow variations of the turbine side, relative to those of a model within tolerance.
+pub(crate) fn constants(readings: &Readings, declared: &Declared, own_factor: f64) -> Vec<Response> {
     let mut constants = Vec::new();
     for (perturbation, response) in PERTURBATIONS.iter().zip(&readings.responses) {
         let sigma = match perturbation {
@@ -243,15 +251,15 @@ pub(crate) fn constants(readings: &Readings, declared: &Declared) -> Vec<Respons
         let acts_in = |step: usize| readings.steps[step].condition == condition;
         for (perturbation, sigma) in OWN_DEVIATIONS {
             if let Some(response) = readings.response(perturbation) {
-                constants.push(response_in(readings, response, sigma, &acts_in));
+                constants.push(response_in(readings, response, own_factor * sigma, &acts_in));
             }
         }
         for (output, channel) in OUTPUTS.iter().enumerate() {
-            let deviation = |reading: f64| own_deviation(*channel, reading);
+            let deviation = |reading: f64| own_factor * own_deviation(*channel, reading);
             constants.push(channel_response(readings, output, &deviation, &acts_in));
         }
     }
-    add_slow_variations(readings, declared, &mut constants);
+    add_slow_variations(readings, declared, own_factor, &mut constants);
     constants.retain(|constant| constant.iter().take(readings.row_count()).any(|value| *value != 0.0));
     constants
 }
@@ -270,7 +278,12 @@ const TURBINE_VARIATION: [(Channel, f64); 2] = [(Channel::Tt, 0.2), (Channel::T4
 const MAX_INTERVALS: f64 = 60.0;
 
 /// Adds time histories, linear between knots, of the air around the housings and of the turbine side. No drift has one, so none is hidden.
-fn add_slow_variations(readings: &Readings, declared: &Declared, constants: &mut Vec<Response>) {
+fn add_slow_variations(
+    readings: &Readings,
+    declared: &Declared,
+    own_factor: f64,
+    constants: &mut Vec<Response>,
+) {
     let ambient_k = Perturbation::Ambient.tolerance(&declared.tolerances);
     let (start_s, end_s) = readings.span_s();
     let count = ((end_s - start_s) / KNOT_S).ceil().clamp(1.0, MAX_INTERVALS);
@@ -290,7 +303,8 @@ fn add_slow_variations(readings: &Readings, declared: &Declared, constants: &mut
             constants.push(variation(&|row, _| ambient_k * ambient[row]));
         }
         for (channel, sigma) in TURBINE_VARIATION {
-            constants.push(variation(&|_, output| if OUTPUTS[output] == channel { sigma } else { 0.0 }));
+            let size = own_factor * sigma;
+            constants.push(variation(&|_, output| if OUTPUTS[output] == channel { size } else { 0.0 }));
         }
     }
 }

@@ -31,9 +31,10 @@ impl Refinement {
         drives: &mut [Drive<'_>],
         declared: &Declared,
     ) -> Result<Refinement, DriftError> {
-        let mut refined = Refinement::of(readings, own, declared, &[])?;
+        let own_factor = own_factor(&readings, own, declared)?;
+        let mut refined = Refinement::of(readings, own, (declared, own_factor), &[])?;
         for _ in 0..ROUNDS {
-            match refined.refine(own, drives, declared) {
+            match refined.refine(own, drives, (declared, own_factor)) {
                 Some(better) => refined = better,
                 None => break,
             }
@@ -45,12 +46,10 @@ impl Refinement {
     fn of(
         readings: Readings,
         own: &[DMatrix<f64>],
-        declared: &Declared,
+        (declared, own_factor): (&Declared, f64),
         known: &[FittedDrift],
     ) -> Result<Refinement, DriftError> {
-        let constants = constants(&readings, declared);
-        let columns =
-            DMatrix::from_fn(readings.row_count(), constants.len(), |row, column| constants[column][row]);
+        let (constants, columns) = constants_and_columns(&readings, declared, own_factor);
         let decide = |known: &[FittedDrift]| -> Result<(Decision, FittedDrifts), DriftError> {
             let histories: Vec<(Cause, TimeHistory)> =
                 known.iter().map(|fit| (fit.drift.cause, fit.drift.history)).collect();
@@ -73,7 +72,7 @@ impl Refinement {
         &self,
         own: &[DMatrix<f64>],
         drives: &mut [Drive<'_>],
-        declared: &Declared,
+        constants: (&Declared, f64),
     ) -> Option<Refinement> {
         let fitted = &self.fits.drifts;
         let drifts: Vec<Drift> = fitted.iter().map(|fit| fit.drift).filter(Drift::acts_on_model).collect();
@@ -87,9 +86,48 @@ impl Refinement {
             let signature = readings.model_signature(drift.cause)?;
             readings.subtract_from_model(&signature, drift);
         }
-        let refined = Refinement::of(readings, own, declared, fitted).ok()?;
+        let refined = Refinement::of(readings, own, constants, fitted).ok()?;
         (!refined.fits.drifts.is_empty()).then_some(refined)
     }
+}
+
+/// Responses to the constants, and as the columns of the readings.
+fn constants_and_columns(
+    readings: &Readings,
+    declared: &Declared,
+    own_factor: f64,
+) -> (Vec<Response>, DMatrix<f64>) {
+    let constants = constants(readings, declared, own_factor);
+    let columns =
+        DMatrix::from_fn(readings.row_count(), constants.len(), |row, column| constants[column][row]);
+    (constants, columns)
+}
+
+/// Factors on the deviations of the operating points, of which the most probable is taken. Bound: a model within tolerance; two that are off by a cause
+/// of the gap of some and of many declared tolerances.
+const OWN_FACTORS: [f64; 3] = [1.0, 3.0, 10.0];
+
+/// The factor on the deviations of the operating points under which the readings are most probable, each with its best explanation: a cause of the gap
+/// that acts all the time moves each operating point by more than tolerances do, and is no drift.
+fn own_factor(readings: &Readings, own: &[DMatrix<f64>], declared: &Declared) -> Result<f64, DriftError> {
+    let candidates = Candidates::new(readings, &[])?;
+    let mut own = own.to_vec();
+    let (_, columns) = constants_and_columns(readings, declared, OWN_FACTORS[0]);
+    // A segment that the model cannot follow says nothing about the others.
+    leave_out(&mut own, readings, &columns, &candidates)?;
+    let mut best = (f64::NEG_INFINITY, OWN_FACTORS[0]);
+    for factor in OWN_FACTORS {
+        let noise = LowRank::new(&own, &constants_and_columns(readings, declared, factor).1)?;
+        let whitened = noise.whiten(readings.difference.clone());
+        let explained = candidates.likelihood(&noise, &readings.difference).explain(&candidates.priors);
+        let gained = explained.map_or(0.0, |explanation| explanation.ln_odds);
+        let squares = whitened.dot(&noise.inverse_times(&whitened));
+        let ln_likelihood = gained - 0.5 * (squares + noise.ln_determinant());
+        if ln_likelihood > best.0 {
+            best = (ln_likelihood, factor);
+        }
+    }
+    Ok(best.1)
 }
 
 /// The constants, and the effect of a small error of each known onset, which would otherwise look like another drift.
@@ -189,7 +227,7 @@ fn fit_one(
 ) -> Result<FittedDrift, DriftError> {
     let (start_s, end_s) = readings.span_s();
     let mut fine = time_histories(start_s, end_s, FINE_ONSETS);
-    fine.retain(|history| history.shape == start.shape);
+    fine.retain(|history| history.shape == start.shape && readings.is_seen(history));
     let signature = signature(readings, cause)?;
     let columns: Vec<DVector<f64>> =
         fine.iter().map(|history| readings.column(&signature, *history)).collect();

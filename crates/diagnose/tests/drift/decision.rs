@@ -4,7 +4,7 @@
 
 use crate::drift::common;
 
-use common::{Planted, campaign, campaign_with_play, drift_reading, judge, judge_all, judge_on};
+use common::{Planted, Unmodelled, campaign, campaign_on, drift_reading, judge, judge_all, judge_on};
 use mapper_core::{ActuatorMotion, Channel, RigActuators};
 use mapper_diagnose::drift::{
     Alternative, Cause, DriftReport, DriftVerdict, FoundDrift, RATE_PER_H, RateOrStep, RecordedRun,
@@ -49,7 +49,18 @@ fn play_of_the_valve_is_no_drift() {
     let at_once = ActuatorMotion { lag_s: 0.0, rate_per_s: f64::INFINITY, dead_time_s: 0.0 };
     let declared = RigActuators { valve: at_once, valve_play_ratio: 0.02, ..RigActuators::FAST_VALVE };
     for (play_ratio, actuators) in [(0.02, Some(declared)), (0.02, None), (0.06, None)] {
-        let report = judge_on(&campaign_with_play(11, None, play_ratio).recording, actuators);
+        let unmodelled = Unmodelled { play_ratio, ..Unmodelled::default() };
+        let report = judge_on(&campaign_on(11, None, unmodelled).recording, actuators);
+        assert_eq!((report.verdict, report.drifts.len()), (DriftVerdict::None, 0), "{}", report.reason);
+    }
+}
+
+/// A share of the housing before the wheel, which the model does not have, moves each operating point by its own amount, but all visits of one alike.
+#[test]
+fn a_cause_that_acts_all_the_time_is_no_drift() {
+    for alpha_area_ratio in [0.05, 0.15] {
+        let unmodelled = Unmodelled { alpha_area_ratio, ..Unmodelled::default() };
+        let report = judge(&campaign_on(11, None, unmodelled).recording);
         assert_eq!((report.verdict, report.drifts.len()), (DriftVerdict::None, 0), "{}", report.reason);
     }
 }

@@ -34,6 +34,8 @@ pub enum NuisanceKind {
     /// Clock error of one output, by its index in [`OUTPUTS`].
     Delay(usize),
     ValveLag,
+    /// Share of the valve's commanded motion that it does not make.
+    ValveStroke,
     /// A part of an output that the model's equations miss in every step: the output's index in [`OUTPUTS`], and the part's.
     Structure(usize, usize),
 }
@@ -74,6 +76,7 @@ impl std::fmt::Display for NuisanceKind {
             NuisanceKind::Shape(i) => write!(f, "efficiency_shape {i}"),
             NuisanceKind::Delay(output) => write!(f, "delay of {}", OUTPUTS[*output]),
             NuisanceKind::ValveLag => f.write_str("valve_lag"),
+            NuisanceKind::ValveStroke => f.write_str("valve_stroke"),
             NuisanceKind::Structure(output, part) => write!(f, "structure of {} {part}", OUTPUTS[*output]),
         }
     }
@@ -104,6 +107,8 @@ const DELAY_SIGMA_S: f64 = 0.02;
 
 /// Error of the lag of the valve, s. Bound: a tenth of a sample interval, to which samples show the lag of what moves within one.
 const VALVE_LAG_SIGMA_S: f64 = 0.01;
+/// Error of the stroke of the valve, as a share of its commanded motion. Source: data sheets of positioners, linear within 0.5 to 1 % of the stroke.
+const VALVE_STROKE_SIGMA_RATIO: f64 = 0.005;
 
 /// Length of a jump, s. Bound: ten times the usual lag of P3 behind its command (0.3 s), after which 5e-5 of the jump is left.
 pub(crate) const JUMP_S: f64 = 3.0;
@@ -151,7 +156,7 @@ pub(crate) fn nuisances(declared: &Declared) -> Vec<Nuisance> {
     all.extend(
         (0..OUTPUTS.len()).map(|i| (K::Delay(i), DELAY_SIGMA_S.hypot(structure_delay_s(declared, i)))),
     );
-    all.push((K::ValveLag, VALVE_LAG_SIGMA_S));
+    all.extend([(K::ValveLag, VALVE_LAG_SIGMA_S), (K::ValveStroke, VALVE_STROKE_SIGMA_RATIO)]);
     let parts = (0..OUTPUTS.len()).flat_map(|i| (0..RESPONSES_S.len()).map(move |part| (i, part)));
     all.extend(parts.map(|(i, part)| (K::Structure(i, part), structure_ratio(declared, i))));
     all.into_iter()
@@ -211,6 +216,7 @@ pub(crate) fn apply(
         K::TurbineDrop => circumstances.t4_drop_ratio += value,
         K::Shape(i) => circumstances.shape[i] += value,
         K::ValveLag => rig.instruments.valve.lag_s += value,
+        K::ValveStroke => rig.instruments.valve.stuck_ratio += value,
         K::Delay(i) => circumstances.delay_s[i] += value,
         K::Structure(output, part) => circumstances.missed_ratio[output][part] += value,
     }

@@ -283,7 +283,8 @@ impl NuisanceKind {
             NuisanceKind::CommonOffset(_)
             | NuisanceKind::Perturbation(_)
             | NuisanceKind::Shape(_)
-            | NuisanceKind::ValveLag => true,
+            | NuisanceKind::ValveLag
+            | NuisanceKind::ValveStroke => true,
         }
     }
 }

@@ -165,11 +165,21 @@ impl Inputs for Cell {
 
 /// A whole campaign.
 pub fn campaign(seed: u64, planted: Option<Planted>) -> Campaign {
-    campaign_with_play(seed, planted, 0.0)
+    campaign_on(seed, planted, Unmodelled::default())
 }
 
-/// A whole campaign whose valve stays behind its drive by half of `play_ratio`, on the side from which it comes.
-pub fn campaign_with_play(seed: u64, planted: Option<Planted>, play_ratio: f64) -> Campaign {
+/// What the nominal machine does not have, all the time.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Unmodelled {
+    /// The valve stays behind its drive by half of this, on the side from which it comes.
+    pub play_ratio: f64,
+    /// Share of the housing's area before the wheel.
+    pub alpha_area_ratio: f64,
+}
+
+/// A whole campaign on a machine that is not the nominal one.
+pub fn campaign_on(seed: u64, planted: Option<Planted>, unmodelled: Unmodelled) -> Campaign {
+    let Unmodelled { play_ratio, alpha_area_ratio } = unmodelled;
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let base = nominal();
@@ -181,6 +191,7 @@ pub fn campaign_with_play(seed: u64, planted: Option<Planted>, play_ratio: f64) 
     truth.compressor.nusselt_coefficient *= 1.0 + 0.03 * normal();
     truth.external_convection_ratio *= 1.0 + 0.1 * normal();
     truth.bearing.oil_conductance_w_k *= 1.0 + 0.05 * normal();
+    truth.compressor.alpha_area_ratio = alpha_area_ratio;
     let flow_gain = 1.0 + 0.005 * normal();
     let offsets: Vec<f64> = SENSORS.iter().map(|(_, _, offset)| offset * normal()).collect();
     let swings = std::array::from_fn(|_| {

@@ -220,9 +220,26 @@ fn own_deviation(channel: Channel, reading: f64) -> f64 {
     }
 }
 
-/// Responses to all constants of a campaign, each of one standard deviation. `own_factor`: size of the deviations of each operating point and of the
-/// slow variations of the turbine side, relative to those of a model within tolerance.
-pub(crate) fn constants(readings: &Readings, declared: &Declared, own_factor: f64) -> Vec<Response> {
+/// Sizes of the deviations of the operating points, relative to those of a model within tolerance.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OwnFactors {
+    pub all: f64,
+    /// Further factor of the turbine side, whose slow variations it scales too.
+    pub turbine: f64,
+}
+
+impl OwnFactors {
+    fn of(self, is_turbine: bool) -> f64 {
+        if is_turbine { self.all * self.turbine } else { self.all }
+    }
+
+    fn of_channel(self, channel: Channel) -> f64 {
+        self.of(matches!(channel, Channel::TurbineFlow | Channel::Tt | Channel::T4))
+    }
+}
+
+/// Responses to all constants of a campaign, each of one standard deviation.
+pub(crate) fn constants(readings: &Readings, declared: &Declared, factors: OwnFactors) -> Vec<Response> {
     let mut constants = Vec::new();
     for (perturbation, response) in PERTURBATIONS.iter().zip(&readings.responses) {
         let sigma = match perturbation {
@@ -251,15 +268,17 @@ pub(crate) fn constants(readings: &Readings, declared: &Declared, own_factor: f6
         let acts_in = |step: usize| readings.steps[step].condition == condition;
         for (perturbation, sigma) in OWN_DEVIATIONS {
             if let Some(response) = readings.response(perturbation) {
-                constants.push(response_in(readings, response, own_factor * sigma, &acts_in));
+                let sigma = factors.of(perturbation == Perturbation::TurbineEfficiency) * sigma;
+                constants.push(response_in(readings, response, sigma, &acts_in));
             }
         }
         for (output, channel) in OUTPUTS.iter().enumerate() {
-            let deviation = |reading: f64| own_factor * own_deviation(*channel, reading);
+            let factor = factors.of_channel(*channel);
+            let deviation = |reading: f64| factor * own_deviation(*channel, reading);
             constants.push(channel_response(readings, output, &deviation, &acts_in));
         }
     }
-    add_slow_variations(readings, declared, own_factor, &mut constants);
+    add_slow_variations(readings, declared, factors, &mut constants);
     constants.retain(|constant| constant.iter().take(readings.row_count()).any(|value| *value != 0.0));
     constants
 }
@@ -281,7 +300,7 @@ const MAX_INTERVALS: f64 = 60.0;
 fn add_slow_variations(
     readings: &Readings,
     declared: &Declared,
-    own_factor: f64,
+    factors: OwnFactors,
     constants: &mut Vec<Response>,
 ) {
     let ambient_k = Perturbation::Ambient.tolerance(&declared.tolerances);
@@ -303,7 +322,7 @@ fn add_slow_variations(
             constants.push(variation(&|row, _| ambient_k * ambient[row]));
         }
         for (channel, sigma) in TURBINE_VARIATION {
-            let size = own_factor * sigma;
+            let size = factors.of(true) * sigma;
             constants.push(variation(&|_, output| if OUTPUTS[output] == channel { size } else { 0.0 }));
         }
     }

@@ -3,7 +3,7 @@
 use crate::drift::candidates::{Candidates, FINE_ONSETS, LowRank, time_histories};
 use crate::drift::causes::{Cause, Drift};
 use crate::drift::drive::{Drive, predict};
-use crate::drift::readings::{Readings, Response, constants};
+use crate::drift::readings::{OwnFactors, Readings, Response, constants};
 use crate::drift::report::{Alternative, DetectionLimit};
 use crate::drift::runs::{DriftError, Unsolvable};
 use mapper_core::unit_factors::S_PER_H;
@@ -31,10 +31,10 @@ impl Refinement {
         drives: &mut [Drive<'_>],
         declared: &Declared,
     ) -> Result<Refinement, DriftError> {
-        let own_factor = own_factor(&readings, own, declared)?;
-        let mut refined = Refinement::of(readings, own, (declared, own_factor), &[])?;
+        let factors = own_factors(&readings, own, declared)?;
+        let mut refined = Refinement::of(readings, own, (declared, factors), &[])?;
         for _ in 0..ROUNDS {
-            match refined.refine(own, drives, (declared, own_factor)) {
+            match refined.refine(own, drives, (declared, factors)) {
                 Some(better) => refined = better,
                 None => break,
             }
@@ -46,10 +46,10 @@ impl Refinement {
     fn of(
         readings: Readings,
         own: &[DMatrix<f64>],
-        (declared, own_factor): (&Declared, f64),
+        (declared, factors): (&Declared, OwnFactors),
         known: &[FittedDrift],
     ) -> Result<Refinement, DriftError> {
-        let (constants, columns) = constants_and_columns(&readings, declared, own_factor);
+        let (constants, columns) = constants_and_columns(&readings, declared, factors);
         let decide = |known: &[FittedDrift]| -> Result<(Decision, FittedDrifts), DriftError> {
             let histories: Vec<(Cause, TimeHistory)> =
                 known.iter().map(|fit| (fit.drift.cause, fit.drift.history)).collect();
@@ -72,7 +72,7 @@ impl Refinement {
         &self,
         own: &[DMatrix<f64>],
         drives: &mut [Drive<'_>],
-        constants: (&Declared, f64),
+        constants: (&Declared, OwnFactors),
     ) -> Option<Refinement> {
         let fitted = &self.fits.drifts;
         let drifts: Vec<Drift> = fitted.iter().map(|fit| fit.drift).filter(Drift::acts_on_model).collect();
@@ -95,39 +95,53 @@ impl Refinement {
 fn constants_and_columns(
     readings: &Readings,
     declared: &Declared,
-    own_factor: f64,
+    factors: OwnFactors,
 ) -> (Vec<Response>, DMatrix<f64>) {
-    let constants = constants(readings, declared, own_factor);
+    let constants = constants(readings, declared, factors);
     let columns =
         DMatrix::from_fn(readings.row_count(), constants.len(), |row, column| constants[column][row]);
     (constants, columns)
 }
 
-/// Factors on the deviations of the operating points, of which the most probable is taken. Bound: a model within tolerance; two that are off by a cause
-/// of the gap of some and of many declared tolerances.
-const OWN_FACTORS: [f64; 3] = [1.0, 3.0, 10.0];
+/// Factors on the deviations of the operating points, of which the most probable is taken. Bound: from a model within tolerance to one that is off by a
+/// cause of the gap of many declared tolerances; a size that is wrong by less than a half changes no decision.
+const OWN_FACTORS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
 
-/// The factor on the deviations of the operating points under which the readings are most probable, each with its best explanation: a cause of the gap
-/// that acts all the time moves each operating point by more than tolerances do, and is no drift.
-fn own_factor(readings: &Readings, own: &[DMatrix<f64>], declared: &Declared) -> Result<f64, DriftError> {
+/// The factors on the deviations of the operating points under which the readings are most probable, each with its best explanation: a cause of the
+/// gap that acts all the time moves each operating point by more than tolerances do, and is no drift.
+fn own_factors(
+    readings: &Readings,
+    own: &[DMatrix<f64>],
+    declared: &Declared,
+) -> Result<OwnFactors, DriftError> {
     let candidates = Candidates::new(readings, &[])?;
     let mut own = own.to_vec();
-    let (_, columns) = constants_and_columns(readings, declared, OWN_FACTORS[0]);
+    let within = OwnFactors { all: OWN_FACTORS[0], turbine: OWN_FACTORS[0] };
     // A segment that the model cannot follow says nothing about the others.
-    leave_out(&mut own, readings, &columns, &candidates)?;
-    let mut best = (f64::NEG_INFINITY, OWN_FACTORS[0]);
-    for factor in OWN_FACTORS {
-        let noise = LowRank::new(&own, &constants_and_columns(readings, declared, factor).1)?;
+    leave_out(&mut own, readings, &constants_and_columns(readings, declared, within).1, &candidates)?;
+    let ln_likelihood = |factors: OwnFactors| -> Result<f64, DriftError> {
+        let noise = LowRank::new(&own, &constants_and_columns(readings, declared, factors).1)?;
         let whitened = noise.whiten(readings.difference.clone());
         let explained = candidates.likelihood(&noise, &readings.difference).explain(&candidates.priors);
         let gained = explained.map_or(0.0, |explanation| explanation.ln_odds);
         let squares = whitened.dot(&noise.inverse_times(&whitened));
-        let ln_likelihood = gained - 0.5 * (squares + noise.ln_determinant());
-        if ln_likelihood > best.0 {
-            best = (ln_likelihood, factor);
-        }
+        Ok(gained - 0.5 * (squares + noise.ln_determinant()))
+    };
+    let mut best = (f64::NEG_INFINITY, within);
+    for all in OWN_FACTORS {
+        let factors = OwnFactors { all, ..within };
+        best = better(best, (ln_likelihood(factors)?, factors));
+    }
+    let all = best.1.all;
+    for turbine in OWN_FACTORS.into_iter().skip(1) {
+        let factors = OwnFactors { all, turbine };
+        best = better(best, (ln_likelihood(factors)?, factors));
     }
     Ok(best.1)
+}
+
+fn better(one: (f64, OwnFactors), other: (f64, OwnFactors)) -> (f64, OwnFactors) {
+    if other.0 > one.0 { other } else { one }
 }
 
 /// The constants, and the effect of a small error of each known onset, which would otherwise look like another drift.

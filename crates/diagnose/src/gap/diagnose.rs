@@ -14,11 +14,11 @@ use crate::gap::gap_reduction::{Compared, beyond_prior, held_out_gap};
 use crate::gap::library_fits::{LibraryFits, explained};
 use crate::gap::next_experiment::{Suggested, next, sensor_near};
 use crate::gap::preconditions::{
-    GapError, Prepared, Problem, Zeroed, another_machine, assumed, checked_study, is_of_sensors,
+    GapError, Prepared, Problem, Zeroed, another_machine, assumed, checked_study, found_drift, is_of_sensors,
 };
 use crate::gap::report::{Candidate, Diagnosis, Gap, Next, Place, Verdict};
 use crate::gap::request::{BaselineRecording, ClosureSearch, GapRequest, RigRecording};
-use crate::gap::residuals::study::{Hypothesis, Prediction, Study, members};
+use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_identify::ZeroOutcome;
 use mapper_observe::model_inputs::step_timing::with_command_times;
@@ -104,10 +104,22 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     progress(0.0, "drift");
     let mut prepared = Prepared::new(&rig, &calibration);
     in_library(0.0, "reading");
-    let driven = drive_model(&rig, &mut prepared, request.baseline, effects, &calibration)?;
-    in_library(MODEL_DRIVEN, "tolerances");
-    let DrivenModel { study, linearised, baseline, warnings } = driven;
-    let library = LibraryFits::new(study, linearised, &calibration, &in_library)?;
+    let constant = match prepared.with_drift_left(&rig).filter(|_| request.baseline.is_none()) {
+        Some(left) => with_constant_causes(&rig, left, &effects, &calibration, &in_library)?,
+        None => None,
+    };
+    let (baseline, warnings, library) = match constant {
+        Some((left, warnings, library)) => {
+            prepared = left;
+            (None, warnings, library)
+        }
+        None => {
+            let driven = drive_model(&rig, &mut prepared, request.baseline, effects, &calibration)?;
+            in_library(MODEL_DRIVEN, "tolerances");
+            let DrivenModel { study, linearised, baseline, warnings } = driven;
+            (baseline, warnings, LibraryFits::new(study, linearised, &calibration, &in_library)?)
+        }
+    };
     in_library(LIBRARY_FITTED, "residual");
     let posterior = library.posterior(&calibration);
     let gap = gap_on_held_out_steps(&library, &posterior, &calibration);
@@ -187,6 +199,28 @@ pub fn gap(request: GapRequest<'_>) -> Result<Diagnosed, GapError> {
     let diagnosis = Diagnosis { map_effect, ..diagnosis };
     progress(1.0, "done");
     Ok(Diagnosed { diagnosis, drift: prepared.drift, zero, found, study, fits, library: Some(library) })
+}
+
+/// The library's fits to the recording with its drift left in it, if causes that act all the time leave only noise and a machine with them shows no drift:
+/// their effect differs from point to point, and the drift search took that for a change. `None` otherwise.
+fn with_constant_causes(
+    rig: &RigRecording,
+    mut left: Prepared,
+    effects: &[Arc<dyn Effect>],
+    calibration: &Calibration,
+    progress: &dyn Fn(f64, &str),
+) -> Result<Option<(Prepared, Vec<GapWarning>, LibraryFits)>, GapError> {
+    let DrivenModel { study, linearised, warnings, .. } =
+        drive_model(rig, &mut left, None, effects.to_vec(), calibration)?;
+    let library = LibraryFits::new(study, linearised, calibration, progress)?;
+    let posterior = library.posterior(calibration);
+    let is_constant = posterior.candidates.first().is_some_and(|cause| cause.onsets.is_empty());
+    let Some(fit) = library.fits.first().filter(|_| is_constant && posterior.probabilities.unmodelled < 0.5)
+    else {
+        return Ok(None);
+    };
+    let (found, _) = library.study.rig(&fit.hypothesis, 0).map_err(PredictError::from)?;
+    Ok(found_drift(rig, &found.model).is_none().then_some((left, warnings, library)))
 }
 
 /// The nominal model driven by a recording, or by its changes since a baseline.

@@ -311,7 +311,7 @@ impl Prepared {
     pub(crate) fn new(rig: &RigRecording, calibration: &Calibration) -> Prepared {
         let as_recorded = Zeroed::new(rig, None);
         let ready = |zeroed, drift| Prepared { zeroed, drift, rejected_drift: None, linearised: None };
-        let Some(drift) = found_drift(rig) else { return ready(as_recorded, None) };
+        let Some(drift) = found_drift(rig, &rig.model) else { return ready(as_recorded, None) };
         match as_recorded.linearise_noise(rig, calibration) {
             Ok(Some(linearised)) => Prepared {
                 rejected_drift: Some(drift.reason),
@@ -321,14 +321,21 @@ impl Prepared {
             _ => ready(Zeroed::new(rig, Some(&drift)), Some(drift)),
         }
     }
+
+    /// The recording with its drift left in it; `None` if none was found.
+    pub(crate) fn with_drift_left(&self, rig: &RigRecording) -> Option<Prepared> {
+        let drift = self.drift.as_ref()?;
+        let rejected_drift = Some(drift.reason.clone());
+        Some(Prepared { zeroed: Zeroed::new(rig, None), drift: None, rejected_drift, linearised: None })
+    }
 }
 
-/// The drift between the repeats of a recording. A recording that does not permit a drift search may still have a gap.
-fn found_drift(rig: &RigRecording) -> Option<DriftReport> {
+/// The drift between the repeats of a recording, of a machine with this model. A recording that does not permit a drift search may still have a gap.
+pub(crate) fn found_drift(rig: &RigRecording, model: &Model) -> Option<DriftReport> {
     if !rig.has_drift_search {
         return None;
     }
-    let RigRecording { recording, model, identification, boundary, tolerances, actuators, .. } = rig;
+    let RigRecording { recording, identification, boundary, tolerances, actuators, .. } = rig;
     let zero = ZeroOutcome::of(recording, identification, rig.zero.map(Into::into));
     let (recording, _) = zero.subtract(recording.clone(), identification.clone());
     let report = drift::diagnose(&DriftRequest {

@@ -3,6 +3,7 @@
 import collections
 import importlib.machinery
 import importlib.util
+import math
 import pathlib
 import sys
 
@@ -26,7 +27,7 @@ class Actuator:
         if abs(command - self.taken) >= self.dead_band:
             self.taken = command
         self.late.append(self.taken)
-        change = (self.late.popleft() - self.drive) * min(1.0, DT / max(self.lag, DT))
+        change = (self.late.popleft() - self.drive) * (1.0 - math.exp(-DT / self.lag))
         self.drive += max(-self.rate * DT, min(self.rate * DT, change))
         self.output = max(self.drive - 0.5 * self.play, min(self.drive + 0.5 * self.play, self.output))
         return self.output

@@ -23,7 +23,7 @@ pub struct StandMotion {
     pub avoid: AvoidedSpeeds,
 }
 
-/// Time constant of a shaft without a plan or a model, s. Judgement: turbochargers of passenger cars take half a second to two.
+/// Time constant of a shaft for ramps without a plan, s. Judgement: turbochargers of passenger cars take half a second to two.
 const USUAL_SHAFT_S: f64 = 1.5;
 /// Relative change of its speed per relative change of P3. Judgement: one at high speeds to three at low ones.
 const USUAL_SENSITIVITY: f64 = 1.5;
@@ -31,7 +31,8 @@ const USUAL_SENSITIVITY: f64 = 1.5;
 const MIN_SPEED_CHANGE_RATIO: f64 = 0.03;
 /// Share of the allowed overshoot up to which P3 may rise. Judgement: the rest is for the error of the acceleration.
 const HOLD_OVERSHOOT_SHARE: f64 = 0.25;
-/// Distance from the limit of speed at which P3 stops rising, relative. Judgement: twice the change of a fast shaft in one interval.
+/// Distance of that from the limit of speed, and at which the speed alone holds P3, relative. Judgement: twice the change of a fast shaft in one
+/// interval.
 const LIMIT_DISTANCE_RATIO: f64 = 0.01;
 /// Range of the time over which the acceleration is measured, s: the shaft's time constant. Judgement: noise is below a tenth of a per cent of the speed.
 const ACCELERATION_S: (f64, f64) = (0.4, 1.0);
@@ -62,11 +63,10 @@ pub(crate) struct TransitionControl {
     valve_share: f64,
     /// Speeds of the targets before and after, rpm.
     targets_rpm: (f64, f64),
-    /// Readings of P3, Pa, and speed, rpm, at the start.
-    first: (Option<f64>, Option<f64>),
-    latest: (Option<f64>, Option<f64>),
+    /// The first reading, as in `recent`.
+    first: Option<(f64, f64, f64)>,
     /// How the shaft follows P3 at the target, without the delay of P3: change of the speed, rpm/Pa, and time constant, s.
-    shaft: (f64, f64),
+    shaft: Option<(f64, f64)>,
     /// Command minus reading of P3 at rest, Pa.
     p3_offset_pa: f64,
     /// Times, s, speeds, rpm, and readings of P3, Pa, over which the acceleration is measured.
@@ -116,12 +116,8 @@ impl TransitionControl {
             p3_share: 0.0,
             valve_share: 0.0,
             targets_rpm: (at.map_or(target_rpm, |at| at.speed_rpm), target_rpm),
-            first: (None, None),
-            latest: (None, None),
-            shaft: match shaft {
-                Some(of) => (of.rpm_per_pa, (of.time_constant_s - stand.actuators.p3.lag_s).max(0.0)),
-                None => (USUAL_SENSITIVITY * target_rpm / to.p3_pa, USUAL_SHAFT_S),
-            },
+            first: None,
+            shaft: shaft.map(|of| (of.rpm_per_pa, (of.time_constant_s - stand.actuators.p3.lag_s).max(0.0))),
             p3_offset_pa,
             recent: VecDeque::new(),
             leader_rests: false,
@@ -189,19 +185,13 @@ impl TransitionControl {
 
     /// Advances to `now_s`, the end of a batch of samples, and returns the next setpoints. `p3_moves`: whether P3 still follows its command.
     pub(crate) fn advance(&mut self, batch: &SampleBatch, now_s: f64, p3_moves: bool) -> Setpoints {
-        let last = |channel: Channel| {
-            batch
-                .column(channel)
-                .and_then(|values| values.iter().rev().copied().find(|value| value.is_finite()))
-        };
-        let (p3_pa, speed_rpm) = (last(Channel::P3), last(Channel::ShaftSpeed));
-        self.latest = (p3_pa.or(self.latest.0), speed_rpm.or(self.latest.1));
-        self.first = (self.first.0.or(p3_pa), self.first.1.or(speed_rpm));
         let column = |channel: Channel| batch.column(channel).unwrap_or_default().iter().copied();
         let rows = batch.t_s.iter().copied().zip(column(Channel::ShaftSpeed)).zip(column(Channel::P3));
         let rows = rows.map(|((t_s, rpm), p3_pa)| (t_s, rpm, p3_pa));
         self.recent.extend(rows.filter(|(_, rpm, p3_pa)| rpm.is_finite() && p3_pa.is_finite()));
-        let span_s = self.shaft.1.clamp(ACCELERATION_S.0, ACCELERATION_S.1);
+        self.first = self.first.or(self.recent.front().copied());
+        let span_s = self.shaft.map_or(0.0, |(_, time_s)| time_s);
+        let span_s = span_s.clamp(ACCELERATION_S.0, ACCELERATION_S.1);
         while self.recent.front().is_some_and(|(t_s, ..)| *t_s < now_s - span_s) {
             self.recent.pop_front();
         }
@@ -237,9 +227,14 @@ impl TransitionControl {
     /// The command of P3 with which the shaft comes to rest at its limit: the pressure now, less what its speed and acceleration are above. It holds for
     /// the opening that the valve has now, however late the air is.
     fn highest_p3_pa(&self) -> Option<f64> {
-        let (rpm_per_pa, time_s) = self.shaft;
         let (speed_rpm, rate_rpm_s) = self.speed_and_rate()?;
         let p3_pa = mean(self.recent.iter().map(|(.., p3_pa)| *p3_pa))?;
+        let usual = || {
+            // Without a model of the shaft, only one that is close to its limit holds P3.
+            let is_close = speed_rpm > self.limit_rpm() * (1.0 - LIMIT_DISTANCE_RATIO);
+            is_close.then_some((USUAL_SENSITIVITY * speed_rpm / p3_pa, 0.0))
+        };
+        let (rpm_per_pa, time_s) = self.shaft.or_else(usual)?;
         let rest_rpm = speed_rpm + time_s * rate_rpm_s;
         Some(p3_pa + self.p3_offset_pa + (self.limit_rpm() - rest_rpm) / rpm_per_pa)
     }
@@ -279,22 +274,14 @@ impl TransitionControl {
             return 1.0;
         }
         // From the readings at the start, which need not be at the last commands.
+        let (Some(first), Some(latest)) = (self.first, self.recent.back()) else { return 1.0 };
         let share = |first: f64, latest: f64, end: f64| {
             if first > end { (first - latest) / (first - end) } else { 1.0 }
         };
-        let p3_share = match (self.first.0, self.latest.0) {
-            (Some(first_pa), Some(latest_pa)) => share(first_pa, latest_pa, self.to.p3_pa),
-            _ => 1.0,
-        };
+        let p3_share = share(first.2, latest.2, self.to.p3_pa);
         let closes = self.to.valve_opening_ratio < self.from.valve_opening_ratio;
-        let speed_share = match (self.first.1, self.latest.1) {
-            (Some(first_rpm), Some(latest_rpm))
-                if closes && self.targets_rpm.1 < first_rpm * (1.0 - MIN_SPEED_CHANGE_RATIO) =>
-            {
-                share(first_rpm, latest_rpm, self.targets_rpm.1)
-            }
-            _ => 1.0,
-        };
+        let slows = self.targets_rpm.1 < first.1 * (1.0 - MIN_SPEED_CHANGE_RATIO);
+        let speed_share = if closes && slows { share(first.1, latest.1, self.targets_rpm.1) } else { 1.0 };
         p3_share.min(speed_share).max(0.0)
     }
 
@@ -425,7 +412,8 @@ mod tests {
         let (from, to) = (point(150e3, 0.5), point(50e3, 2.5));
         let (start, end) = (setpoints(300e3, 0.5), setpoints(130e3, 2.5));
         let plan = step(from, to, 130e3);
-        let mut control = TransitionControl::new(&FAST, start, end, (&plan, Some(from)), (None, 0.0), 0.0).unwrap();
+        let mut control =
+            TransitionControl::new(&FAST, start, end, (&plan, Some(from)), (None, 0.0), 0.0).unwrap();
         let (mut p3_pa, mut complete_s) = (300e3, f64::INFINITY);
         for tick in 1..=600 {
             let t_s = 0.1 * f64::from(tick);
@@ -449,7 +437,9 @@ mod tests {
         let (from, to) = (point(100e3, 2.5), point(150e3, 0.5));
         let (start, end) = (setpoints(160e3, 2.5), setpoints(300e3, 0.5));
         let plan = step(from, to, 300e3);
-        let mut control = TransitionControl::new(&FAST, start, end, (&plan, Some(from)), (None, 0.0), 0.0).unwrap();
+        let shaft = SpeedResponse { rpm_per_pa: 0.5, p3_per_power: 1.0, time_constant_s: 1.3, delay_s: 0.3 };
+        let mut control =
+            TransitionControl::new(&FAST, start, end, (&plan, Some(from)), (Some(shaft), 0.0), 0.0).unwrap();
         let (mut speed_rpm, mut highest_rpm) = (100e3, 0.0f64);
         let mut sent = start;
         for tick in 1..=200 {

@@ -67,8 +67,8 @@ class Backend:
     def poll(self, until_s: float) -> Samples | tuple[npt.ArrayLike, Mapping[str, npt.ArrayLike], Sequence[Fast]]:
         """Return the samples since the last call: their times, s, and the values of each channel; NaN is no reading.
 
-        With fast samples of P1 or P2 they follow as third: for each stretch the channel, the time of its first value and the interval, s, of at most
-        10 ms, and the values.
+        Fast samples of P1 or P2 may follow: for each stretch the channel, the time of its first value, s, the interval, at most 10 ms, in s, and
+        the values.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ class _Rig(_driver.Rig):
     def set(self, setpoints: dict[str, Any]) -> None:
         self._call(self._backend.set, dict(setpoints))
 
-    def poll(self, until_s: float) -> tuple[list[float], dict[str, list[float | None]], list[Any], list[Fast]]:
+    def poll(self, until_s: float) -> tuple[list[float], dict[str, list[float | None]], list[Any], list[Any]]:
         times, columns, *fast = self._call(self._backend.poll, until_s)
         values = {
             name: [None if number != number else number for number in _plain(column)]

@@ -35,7 +35,7 @@ const HOLD_OVERSHOOT_SHARE: f64 = 0.25;
 /// interval.
 const LIMIT_DISTANCE_RATIO: f64 = 0.01;
 /// Range of the time over which the acceleration is measured, s: the shaft's time constant. Judgement: noise is below a tenth of a per cent of the speed.
-const ACCELERATION_S: (f64, f64) = (0.4, 1.0);
+const ACCELERATION_S: (f64, f64) = (0.2, 1.0);
 /// Longest search for a pressure at which the shaft keeps its speed, s. Judgement: half of a usual step.
 const MAX_SEARCH_S: f64 = 20.0;
 /// Time after the ramps in which the shaft may overshoot, s. Judgement: three time constants of a usual shaft.

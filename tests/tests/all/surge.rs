@@ -87,7 +87,8 @@ fn surge_without_precursor_opens_the_valve_and_is_reported() {
 #[test]
 fn soft_surge_is_where_fast_samples_of_p2_vary_as_much_as_declared() {
     let scratch = scratch();
-    let result = run("surge_search: {soft_surge: 1.8}\n", "offsets: none, fast_rate: 1 kHz", 1, scratch.path());
+    let result =
+        run("surge_search: {soft_surge: 1.8}\n", "offsets: none, fast_rate: 1 kHz", 1, scratch.path());
     for mark in result["surge"]["marks"].as_array().unwrap() {
         let soft = &mark["soft"];
         assert_eq!(soft["channel"], "P2", "{mark}");

@@ -52,11 +52,13 @@ MACHINES = {
 ORDERS = ["thermal_gradient", "speed_lines", "conventional"]
 # Other ways to map, on turbo_a alone.
 WITHOUT_ZERO, DYNAMIC, ADIABATIC = "thermal_gradient, no zero", "thermal_gradient, dynamic, 120 s", "adiabatic"
-WAYS = [WITHOUT_ZERO, DYNAMIC, ADIABATIC]
+SLOW_AIR = "thermal_gradient, screw compressor"
+WAYS = [WITHOUT_ZERO, DYNAMIC, ADIABATIC, SLOW_AIR]
+CAMPAIGNS = {ADIABATIC: "turbo_a_adiabatic.yaml", SLOW_AIR: "turbo_a_screw_compressor.yaml"}
 
 
 def campaign(folder, machine, way, seed, dwell):
-    text = (ROOT / "campaigns" / f"turbo_a{'_adiabatic' if way == ADIABATIC else ''}.yaml").read_text()
+    text = (ROOT / "campaigns" / CAMPAIGNS.get(way, "turbo_a.yaml")).read_text()
     for old, new in MACHINES[machine]:
         text = replaced(text, old, new)
     text = re.sub(r"(?m)^seed: .*$", f"seed: {seed}", text)
@@ -64,7 +66,7 @@ def campaign(folder, machine, way, seed, dwell):
         text = re.sub(r"(?m)^order: .*$", f"order: {way.partition(',')[0]}", text)
     if dwell or way == DYNAMIC:
         text = re.sub(r"(?m)^  dwell: .*$", f"  dwell: {dwell or 120} s", text)
-    if way in WAYS or way == "conventional":
+    if way in (WITHOUT_ZERO, DYNAMIC, ADIABATIC, "conventional"):
         text = re.sub(r"(?m)^zero: .*\n", "", text)
     if way == DYNAMIC:
         text = re.sub(r"(?m)^  method: .*$", "  method: dynamic", text)
@@ -198,8 +200,9 @@ Made on {date} by this command, half an hour on two idle cores; do not edit:
 `campaigns/turbo_a.yaml`, each visited for 40 s, by `joint` after an isothermal zero; conventional mapping waits until T2 and the
 housing drift by less than 0.1 K/min, and takes the efficiency from the temperature rise. Errors in points of efficiency.
 
-turbo_a by three other ways, all without a zero: the same plan; `dynamic`, the method of the paper, with its two minutes a point; and
-adiabatic mapping, which holds turbine inlet and oil at the compressor's outlet temperature and waits as conventional mapping does.
+turbo_a by four other ways, three without a zero: the same plan; `dynamic`, the method of the paper, with its two minutes a point; and
+adiabatic mapping, which holds turbine inlet and oil at the compressor's outlet temperature and waits as conventional mapping does. The fourth is
+`campaigns/turbo_a_screw_compressor.yaml`.
 
 - **expected rms**: the plan's forecast, for a machine that is as declared. **rms**: realised, over all points and seeds.
 - **covered**: share of the good points whose 95 % interval contains the truth.

@@ -2,16 +2,22 @@
 
 usage: python3 benches/stands.py PROGRAM STUDY SEEDS [STAND...]
        python3 benches/stands.py random STUDY FIRST COUNT
+       python3 benches/stands.py served BIN PYTHON FIRST COUNT
 
 PROGRAM is the built `mapper`, STUDY the example `stand_study` of mapper-session. Each stand is `campaigns/turbo_a.yaml` with a speed limit of 170 krpm,
 the highest target being 155 krpm; seeds are 1 to SEEDS. Prints a line a run on standard error and the table as Markdown. Run by run, on one core.
 
 `random` draws stands, declared or not, with their machine (inertia, volume), grid and speed limit, and lists those on which the shaft leaves its limit or
 exceeds the higher target of a jump by more than 2 %, the compressor surges, the surge margin falls below 4.5 %, or the run does not end.
+
+`served` draws stands behind pymodbus (even numbers) and asyncua in real time, all at once: `mapper rig commission --write` measures the actuators on every
+other two, which declare nothing, and compares on the rest; then four points are run with what the campaign has. BIN has `mapper`, its drivers and
+`examples/stand_study`; PYTHON the packages of tests/python/requirements.txt.
 """
 
 import json
 import math
+import os
 import pathlib
 import random
 import re
@@ -19,6 +25,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 
 REPOSITORY = pathlib.Path(__file__).resolve().parent.parent
 
@@ -39,11 +46,14 @@ STANDS = {
     "P3 3 s, 20 kPa/s, undeclared": ([p3("3 s", "20 kPa/s")], False),
     "P3 8 s, 5 kPa/s": ([p3("8 s", "5 kPa/s")], True),
     "P3 8 s, 5 kPa/s, undeclared": ([p3("8 s", "5 kPa/s")], False),
+    "P3 stroke 30 s": ("stroke: 30 s", True),
     "P3 stroke 60 s": ("stroke: 60 s", True),
+    "P3 stroke 120 s": ("stroke: 120 s", True),
     "valve 1 s, 0.2 1/s": ([SLOW_VALVE], True),
     "valve 1 s, 0.2 1/s, undeclared": ([SLOW_VALVE], False),
     "play 2 %": ([valve("0.2 s", "1 1/s", "2 %")], True),
     "play 5 %": ([valve("0.2 s", "1 1/s", "5 %")], True),
+    "play 5 %, undeclared": ([valve("0.2 s", "1 1/s", "5 %")], False),
     "P3 8 s, 5 kPa/s, 1 s dead; valve 1 s, 0.2 1/s, play 2 %": ([p3("8 s", "5 kPa/s", "1 s"), valve("1 s", "0.2 1/s", "2 %")], True),
 }
 
@@ -52,9 +62,9 @@ def campaign(stand, seed):
     motions, is_declared = STANDS[stand]
     text = (REPOSITORY / "campaigns" / "turbo_a.yaml").read_text()
     text = text.replace("seed: 1 ", f"seed: {seed} ").replace("speed: 180 krpm", "speed: 170 krpm")
-    if motions == "stroke: 60 s":
+    if isinstance(motions, str):
         text = text.replace("max: 500 kPa}", f"max: 500 kPa, {motions}}}")
-        motions = [p3("0.3 s", f"{390 / 60} kPa/s")]
+        motions = [p3("0.3 s", f"{390 / int(motions.split()[1])} kPa/s")]
         is_declared = False
     flat = [part for motion in motions for part in ([motion] if isinstance(motion, str) else motion)]
     lab = ", ".join(part.replace("RATE", "slew") for part in flat)
@@ -135,6 +145,75 @@ def sweep(study, first, count):
     print(f"{left} of {count} stands leave a limit")
 
 
+# A sample and a half.
+TRANSPORT_S = 0.15
+
+
+def served_stand(binaries, python, number):
+    """What commissioning and a run give on a drawn stand behind a third-party server."""
+    draw = random.Random(number)
+    log = lambda low, high: round(low * (high / low) ** draw.random(), 2)
+    p3 = {"lag": log(0.5, 5), "rate": log(5, 40), "dead_time": draw.choice([0, round(draw.uniform(0.2, 1.5), 1)])}
+    valve = {"lag": log(0.3, 1.5), "rate": log(0.15, 1.5), "play": draw.choice([0, round(draw.uniform(1, 5), 1)]), "dead_band": draw.choice([0, round(draw.uniform(0.2, 1), 1)])}
+    is_declared, driver = number // 2 % 2 == 0, ["modbus", "opcua"][number % 2]
+    actuators = {"p3": p3 | {"rate": 1e3 * p3["rate"]}, "valve": valve | {"play": 0.01 * valve["play"], "dead_band": 0.01 * valve["dead_band"]}}
+    script, arguments = ("modbus_rig.py", ["0", json.dumps(actuators)]) if driver == "modbus" else ("opcua_rig.py", ["0", "--actuators", json.dumps(actuators)])
+    server = subprocess.Popen([python, REPOSITORY / "tests/python" / script, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    port = server.stdout.readline().strip()
+    text = (REPOSITORY / "examples/rig" / ("first_points.yaml" if driver == "modbus" else "first_points_opcua.yaml")).read_text()
+    text = re.sub(r"^    (user|password): .*\n", "", text, flags=re.M)
+    declared = "turbine_inlet_pressure: {lag: LAG s, rate: RATE kPa/s, dead_time: DEAD s}".replace("LAG", str(p3["lag"])).replace("RATE", str(p3["rate"])).replace("DEAD", str(p3["dead_time"]))
+    declared += f", valve: {{lag: {valve['lag']} s, rate: {valve['rate']} 1/s, play: {valve['play']} %, dead_band: {valve['dead_band']} %}}"
+    for old, new in [
+        (":5020 ", f":{port} "),
+        (":4840", f":{port}"),
+        ("basic256_sha256 ", "none "),
+        ("timeout: 200 ms", "timeout: 800 ms"),
+        ("timeout: 300 ms", "timeout: 800 ms"),
+        ("rig: cell_3", f"rig: stand_{number}"),
+        ("openings: [1.0]", "openings: [0.8, 1.3]"),
+        ("dwell: 120 s", "dwell: 60 s"),
+        ("limits:\n", f"rig: {{actuators: {{{declared}}}}}\nlimits:\n" if is_declared else "limits:\n"),
+    ]:
+        text = text.replace(old, new)
+    with tempfile.TemporaryDirectory() as folder:
+        file = pathlib.Path(folder) / "stand.yaml"
+        file.write_text(text)
+        environment = os.environ | {"MAPPER_STATE_DIR": f"{folder}/state", "PATH": f"{binaries}:{os.environ['PATH']}"}
+
+        def mapper(*words):
+            ran = subprocess.run([f"{binaries}/mapper", *words, "--out", f"{folder}/runs", "--json", "--progress", "off"], capture_output=True, text=True, env=environment)
+            return json.loads(ran.stdout) if ran.returncode == 0 else {"failure": (ran.stderr.strip() or ran.stdout)[:300]}
+
+        commissioned = mapper("rig", "commission", file, *([] if is_declared else ["--write"]))
+        true = {("turbine_inlet_pressure", key): value for key, value in p3.items()} | {("valve", key): value for key, value in valve.items()}
+        within, outside = 0, []
+        for value in commissioned.get("actuators", []):
+            expected, measured = true.get((value["actuator"], value["key"])), value["measured"]
+            if expected is None:
+                continue
+            high = math.inf if measured["high"] is None else measured["high"]
+            # Bus and polling add to the dead time.
+            if measured["low"] - (TRANSPORT_S if value["key"] == "dead_time" else 0) <= expected <= high:
+                within += 1
+            else:
+                outside.append(f"{value['actuator']} {value['key']} {expected}: {measured['low']:.3g} to {high:.3g}")
+        ran = mapper("run", file) if "failure" not in commissioned else {}
+        seen = json.loads(subprocess.run([f"{binaries}/examples/stand_study", "recordings", ran["recording"]], capture_output=True, text=True, check=True).stdout) if "recording" in ran else {}
+    server.stdin.close()
+    server.wait()
+    what = f"{number} {driver} {'declared' if is_declared else 'undeclared'} P3 {p3} valve {valve}"
+    print(f"{what}: {within} within, outside {outside}, {seen}, {commissioned.get('failure') or ran.get('failure') or 'completed'}", flush=True)
+
+
+def serve(binaries, python, first, count):
+    threads = [threading.Thread(target=served_stand, args=(binaries, python, number)) for number in range(int(first), int(first) + int(count))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+
 def main(program, study, seeds, *stands):
     print("| stand | runs | minutes | highest N, krpm | worst overshoot, % | surges | good | hold, % | rms error, points |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|", flush=True)
     for stand in stands or STANDS:
@@ -159,4 +238,4 @@ def main(program, study, seeds, *stands):
 if __name__ == "__main__":
     if len(sys.argv) < 4:
         sys.exit(__doc__)
-    sweep(*sys.argv[2:]) if sys.argv[1] == "random" else main(*sys.argv[1:])
+    {"random": sweep, "served": serve}.get(sys.argv[1], lambda *rest: main(sys.argv[1], *rest))(*sys.argv[2:])

@@ -123,6 +123,29 @@ def test_an_exception_of_a_rig_is_the_cause_and_the_rig_is_made_safe(short: Path
     assert rig.calls[-2:] == ["make_safe", "disarm"] or "make_safe" in rig.calls
 
 
+def test_fast_samples_of_a_rig_give_their_coefficient_of_variation(short: Path, tmp_path: Path) -> None:
+    amplitude, rate_hz = 0.01, 1000
+
+    class Swinging(InProcess):
+        def arm(self) -> None:
+            super().arm()
+            self.sent_s = 0.0
+
+        def poll(self, until_s: float) -> Any:
+            times, columns = super().poll(until_s)
+            # A sine of 40 Hz: its standard deviation is the amplitude over the root of two.
+            swing_s = np.arange(round(self.sent_s * rate_hz), round(until_s * rate_hz)) / rate_hz
+            pressure = 150e3 * (1.0 + amplitude * np.sin(2 * np.pi * 40 * swing_s))
+            fast = [("P2", self.sent_s, 1 / rate_hz, pressure)]
+            self.sent_s = until_s
+            return times, columns, fast if len(swing_s) else []
+
+    run = mapper.Campaign.load(short).run(tmp_path, backend=Swinging({}))
+    variation = run.recording["P2_cov"].dropna()
+    assert len(variation) > 0.9 * len(run.recording["P2"])
+    np.testing.assert_allclose(variation.iloc[20:], amplitude / math.sqrt(2), rtol=0.01)
+
+
 def test_a_rig_that_no_one_gave_is_a_mistake_of_the_campaign(short: Path, tmp_path: Path) -> None:
     with pytest.raises(mapper.CampaignError):
         mapper.Campaign.load(short).run(tmp_path)

@@ -1,20 +1,19 @@
 """The small rig of plugins/drivers/python in real time behind pymodbus, a Modbus server that shares no code with the driver.
 
-Usage: modbus_rig.py [PORT]. Prints the port, then serves until standard input is closed. Holding registers: readings from 0 as singles (two
+Usage: modbus_rig.py [PORT [ACTUATORS]], ACTUATORS those of slow_rig.py as JSON. Prints the port, then serves until standard input is closed. Holding registers: readings from 0 as singles (two
 registers each, in the order of CHANNELS), setpoints from 100, air 110, heartbeat 111, tripped 112. As a PLC has to, it cuts the air by
 itself if the heartbeat stops. Register 150 sets how the server misbehaves from then on (MISDEEDS),
 151 how it does.
 """
 
 import asyncio
-import importlib.machinery
-import importlib.util
+import json
 import math
-import pathlib
 import struct
 import sys
 import time
 
+import slow_rig
 from pymodbus.pdu import ExceptionResponse
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
@@ -32,13 +31,6 @@ MISDEEDS = HONEST, OTHER_REGISTER, FEWER_REGISTERS, BUSY_ONCE, CLOSES, OTHER_UNI
 OF_WRITES, OF_READS = 100, 200
 # Byte of a frame, and how it is changed.
 OF_FRAMES = {OTHER_UNIT: 6, OTHER_TRANSACTION: 1, OTHER_FUNCTION: 7}
-
-root = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(root / "plugins/drivers/python"))
-loader = importlib.machinery.SourceFileLoader("rig", str(root / "plugins/drivers/python/mapper-backend-python_rig"))
-rig_module = importlib.util.module_from_spec(importlib.util.spec_from_loader("rig", loader))
-loader.exec_module(rig_module)
-
 
 def words(value):
     return list(struct.unpack(">2H", struct.pack(">f", value)))
@@ -104,7 +96,7 @@ async def live(server, filled, misdeeds):
     async def put(register, values):
         await server.async_setValues(1, WRITE_HOLDING, register, values)
 
-    rig = rig_module.PythonRig({"noise": 1})
+    rig = slow_rig.make({"noise": 1}, json.loads(sys.argv[2]) if len(sys.argv) > 2 else None)
     rig.arm()
     begun = time.monotonic()
     beat, beaten = None, begun

@@ -1,6 +1,6 @@
 """The small rig of plugins/drivers/python in real time behind asyncua, an OPC UA server that shares no code with the driver.
 
-Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD] [--days N]] [--seed N] [--stamps] [--sessions N] [--misdeeds NAME=KIND,...] [--answers CODE]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
+Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD] [--days N]] [--seed N] [--stamps] [--sessions N] [--misdeeds NAME=KIND,...] [--answers CODE] [--actuators JSON]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
 reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat (UInt32), tripped (Boolean); text, flag, table, whole (of other types). As a PLC has to, it cuts the
 air by itself if the heartbeat stops. Values that no stand could bear are refused with BadOutOfRange.
 
@@ -16,8 +16,7 @@ setpoints are answered with that status.
 import argparse
 import asyncio
 import datetime
-import importlib.machinery
-import importlib.util
+import json
 import logging
 import math
 import pathlib
@@ -25,6 +24,7 @@ import socket
 import sys
 import time
 
+import slow_rig
 from asyncua import Server, ua
 from asyncua.crypto.cert_gen import dump_private_key_as_pem, generate_private_key, generate_self_signed_app_certificate
 from asyncua.common.utils import ServiceError
@@ -41,13 +41,6 @@ SETPOINTS = {"p3": ("p3_pa", 110e3, 500e3), "t3": ("t3_k", 298.15, 950.0), "valv
 WATCHDOG_S = 2.0
 NAMESPACE = "urn:mapper:tests:stand"
 APPLICATION = "urn:mapper:tests:server"
-
-root = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(root / "plugins/drivers/python"))
-loader = importlib.machinery.SourceFileLoader("rig", str(root / "plugins/drivers/python/mapper-backend-python_rig"))
-rig_module = importlib.util.module_from_spec(importlib.util.spec_from_loader("rig", loader))
-loader.exec_module(rig_module)
-
 
 class Users(UserManager):
     def __init__(self, name, password):
@@ -182,7 +175,7 @@ def stamp(server, index):
     service.read, service.write = stamped_read, stamped_write
 
 
-async def live(server, nodes, seed, filled, misdeeds):
+async def live(server, nodes, seed, filled, misdeeds, actuators):
     """The rig follows its nodes, and fills them; says when it has done so first."""
 
     async def put(name, value, kind, misdeed=None):
@@ -197,7 +190,7 @@ async def live(server, nodes, seed, filled, misdeeds):
         stamped = ua.DataValue(ua.Variant(value, kind), status, SourceTimestamp=taken, ServerTimestamp=now)
         await server.write_attribute_value(nodes[name].nodeid, stamped)
 
-    rig = rig_module.PythonRig({"noise": 1, "seed": seed})
+    rig = slow_rig.make({"noise": 1, "seed": seed}, actuators)
     rig.arm()
     begun = time.monotonic()
     beat, beaten = None, begun
@@ -235,6 +228,7 @@ async def main():
     parser.add_argument("--sessions", type=int)
     parser.add_argument("--misdeeds")
     parser.add_argument("--answers")
+    parser.add_argument("--actuators", type=json.loads)
     arguments = parser.parse_args()
     logging.disable(logging.ERROR)
     misdeeds = dict(one.split("=") for one in arguments.misdeeds.split(",")) if arguments.misdeeds else {}
@@ -245,7 +239,7 @@ async def main():
     server, nodes = await make(arguments)
     async with server:
         filled = asyncio.Event()
-        living = asyncio.create_task(live(server, nodes, arguments.seed, filled, misdeeds))
+        living = asyncio.create_task(live(server, nodes, arguments.seed, filled, misdeeds, arguments.actuators))
         # Whoever arms it looks at its readings first.
         await filled.wait()
         print(arguments.port, flush=True)

@@ -16,6 +16,9 @@ use mapper_session::{Registry, drive, nominal_model, plan};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+/// Interval of a trace, s.
+const TRACE_S: f64 = 0.5;
+
 #[derive(Default)]
 struct Seen {
     step: Option<(StepMarker, f64)>,
@@ -57,7 +60,7 @@ impl RunObserver for Seen {
         }
         if self.traces
             && let Some((marker, _)) = self.step
-            && (batch.t_s.last().copied().unwrap_or(0.0) / 3.0).floor() > (self.last_s / 3.0).floor()
+            && (batch.t_s.last().copied().unwrap_or(0.0) / TRACE_S).floor() > (self.last_s / TRACE_S).floor()
         {
             let last =
                 |channel: Channel| batch.column(channel).and_then(<[f64]>::last).copied().unwrap_or(f64::NAN);

@@ -116,12 +116,12 @@ proptest! {
     #[test]
     fn declared_stands_keep_speed_and_surge_margin(
         (lag_s, rate_kpa_s, dead_s) in (0.1..8.0f64, 5.0..200.0f64, 0.0..1.5f64),
-        (valve_lag_s, valve_rate, play) in (0.1..1.5f64, 0.2..2.0f64, 0.0..2.0f64),
+        (valve_lag_s, valve_rate, play, dead_band) in (0.1..1.5f64, 0.2..2.0f64, 0.0..8.0f64, 0.0..2.0f64),
         seed in 1..100u64,
     ) {
         let declared = format!(
             "rig: {{actuators: {{turbine_inlet_pressure: {{lag: {lag_s:.2} s, rate: {rate_kpa_s:.1} kPa/s, dead_time: {dead_s:.2} s}}, \
-             valve: {{lag: {valve_lag_s:.2} s, rate: {valve_rate:.2} 1/s, play: {play:.1} %}}}}}}\n"
+             valve: {{lag: {valve_lag_s:.2} s, rate: {valve_rate:.2} 1/s, play: {play:.1} %, dead_band: {dead_band:.1} %}}}}}}\n"
         );
         assert_kept(&run("{}", &declared, seed), &declared);
     }

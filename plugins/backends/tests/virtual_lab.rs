@@ -225,3 +225,29 @@ fn static_taps_read_less_by_the_dynamic_pressure() {
         assert!((total_pa / last(&total, channel) - 1.0).abs() < 1e-9);
     }
 }
+
+/// A heater that follows more air with a lag of 20 s, in closed form; and a loss of P1 with the square of the flow.
+#[test]
+fn t3_sags_when_more_air_comes_and_p1_falls_with_the_flow() {
+    let settings = LabSettings { heater_sag_k: 20.0, inlet_loss_pa: 3e3, ..ideal() };
+    let t3_actuator = ActuatorDynamics::new(20.0, f64::INFINITY);
+    let mut lab = VirtualLab::new(LabSettings { t3_actuator, ..settings });
+    lab.arm().unwrap();
+    let before = setpoints(150e3, 0.7);
+    lab.set(&before).unwrap();
+    lab.poll(5.0).unwrap();
+    lab.set(&setpoints(200e3, 0.7)).unwrap();
+    let batch = lab.poll(25.0).unwrap();
+    let column = |channel| batch.column(channel).unwrap();
+    for (t_s, t3_k) in batch.t_s.iter().zip(column(Channel::T3)) {
+        let expected_k = before.t3_k - 20.0 * 0.5 * (-(t_s - 5.0) / 20.0).exp();
+        assert!((t3_k - expected_k).abs() < 1e-6, "{t_s} s: {t3_k} K, {expected_k} K");
+    }
+    let flows = &column(Channel::CompressorFlow);
+    for (p1_pa, flow_kg_s) in column(Channel::P1)[1..].iter().zip(flows.iter()) {
+        assert!(
+            (p1_pa - (100e3 - 3e3 * (flow_kg_s / 0.1).powi(2))).abs() < 1e-6,
+            "{p1_pa} Pa, {flow_kg_s} kg/s"
+        );
+    }
+}

@@ -8,12 +8,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from mapper import _driver, _mapper
+
+Samples: TypeAlias = tuple[npt.ArrayLike, Mapping[str, npt.ArrayLike]]
+Fast: TypeAlias = tuple[str, float, float, npt.ArrayLike]
 
 
 class Backend:
@@ -61,8 +64,11 @@ class Backend:
         """
         raise NotImplementedError
 
-    def poll(self, until_s: float) -> tuple[npt.ArrayLike, Mapping[str, npt.ArrayLike]]:
+    def poll(self, until_s: float) -> Samples | tuple[npt.ArrayLike, Mapping[str, npt.ArrayLike], Sequence[Fast]]:
         """Return the samples since the last call: their times, s, and the values of each channel; NaN is no reading.
+
+        Fast samples of P1 or P2 may follow: for each stretch the channel, the time of its first value, s, the interval, at most 10 ms, in s, and
+        the values.
 
         Parameters
         ----------
@@ -97,13 +103,14 @@ class _Rig(_driver.Rig):
     def set(self, setpoints: dict[str, Any]) -> None:
         self._call(self._backend.set, dict(setpoints))
 
-    def poll(self, until_s: float) -> tuple[list[float], dict[str, list[float | None]], list[Any]]:
-        times, columns = self._call(self._backend.poll, until_s)
+    def poll(self, until_s: float) -> tuple[list[float], dict[str, list[float | None]], list[Any], list[Any]]:
+        times, columns, *fast = self._call(self._backend.poll, until_s)
         values = {
             name: [None if number != number else number for number in _plain(column)]
             for name, column in columns.items()
         }
-        return _plain(times), values, []
+        stretches = [(name, float(first), float(step), _plain(of)) for name, first, step, of in (fast or [[]])[0]]
+        return _plain(times), values, [], stretches
 
     def make_safe(self) -> None:
         self._call(self._backend.make_safe)

@@ -83,16 +83,17 @@ fn surge_without_precursor_opens_the_valve_and_is_reported() {
     assert!(result["failure"].is_null(), "{}", result["failure"]);
 }
 
-/// Soft surge is where the lab's fluctuation has doubled the variation of P2: its variance is (0.06 %)^2 (25 %/margin - 1), and the sensor adds 60 Pa.
+/// Soft surge is where the lab's fluctuation has grown the variation of P2 as much as the campaign asks for: its variance is (0.06 %)^2 (25 %/margin - 1), and the sensor adds 60 Pa.
 #[test]
-fn soft_surge_is_where_fast_samples_of_p2_vary_twice_as_much() {
+fn soft_surge_is_where_fast_samples_of_p2_vary_as_much_as_declared() {
     let scratch = scratch();
-    let result = run("surge_search: {}\n", "offsets: none, fast_rate: 1 kHz", 1, scratch.path());
+    let result =
+        run("surge_search: {soft_surge: 1.8}\n", "offsets: none, fast_rate: 1 kHz", 1, scratch.path());
     for mark in result["surge"]["marks"].as_array().unwrap() {
         let soft = &mark["soft"];
         assert_eq!(soft["channel"], "P2", "{mark}");
         let variation = value(soft, "variation_ratio");
-        assert!((variation / value(soft, "quiet_ratio") - 2.0).abs() < 1e-9, "{soft}");
+        assert!((variation / value(soft, "quiet_ratio") - 1.8).abs() < 1e-9, "{soft}");
         let noise = 60.0 / (1e5 * value(soft, "pressure_ratio"));
         let margin = 0.25 / (1.0 + (variation * variation - noise * noise) / 6e-4_f64.powi(2));
         let found = value(soft, "flow_corrected_kg_s") / value(mark, "truth_flow_corrected_kg_s") - 1.0;
@@ -100,5 +101,5 @@ fn soft_surge_is_where_fast_samples_of_p2_vary_twice_as_much() {
         assert!((found - margin).abs() < 0.03, "margin {found} for {margin}: {mark}");
     }
     let table = std::fs::read_to_string(result["map"]["surge"].as_str().unwrap()).unwrap();
-    assert!(table.contains("soft_flow_corrected_kg_s") && table.contains("2.0 times"), "{table}");
+    assert!(table.contains("soft_flow_corrected_kg_s") && table.contains("1.8 times"), "{table}");
 }

@@ -128,6 +128,8 @@ element! {
         standard_error => wanted_standard_error_ratio: Quantity<Fraction> [extend("x-min" = "0.1 %", "x-max" = "5 %"), example = &"0.8 %"];
         /// Maximum number of openings of one line; 40 if none is given.
         most_steps => most_steps: usize [range(min = 5, max = 200), example = 40];
+        /// Growth of the coefficient of variation of a pressure, from far from surge, at which soft surge is marked; 2 if none is given. It needs fast samples of P2 or P1.
+        soft_surge => soft_growth_ratio: f64 [range(min = 1.2, max = 100), example = 2.0];
     }
 }
 
@@ -163,8 +165,9 @@ mod tests {
         let written = SurgeSearchSettings {
             closest_margin_ratio: 0.05,
             dwell_s: 60.0,
+            soft_growth_ratio: 3.0,
             ..SurgeSearchSettings::default()
         };
-        assert_eq!(read("{closest: 5 %, dwell: 1 min}"), written);
+        assert_eq!(read("{closest: 5 %, dwell: 1 min, soft_surge: 3}"), written);
     }
 }

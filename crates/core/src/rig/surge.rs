@@ -18,6 +18,8 @@ pub struct SurgeSearchSettings {
     pub wanted_standard_error_ratio: f64,
     /// Maximum number of steps of one line, without the return to safe flow.
     pub most_steps: usize,
+    /// Coefficient of variation of a pressure at soft surge over that far from surge, ratio, > 1.
+    pub soft_growth_ratio: f64,
 }
 
 impl SurgeSearchSettings {
@@ -38,6 +40,9 @@ impl Default for SurgeSearchSettings {
             wanted_standard_error_ratio: 0.008,
             // Bound: effort; a line needs a third of them.
             most_steps: 40,
+            // Judgement: SAE J1826 (2022) asks for the knee of its growth, and leaves the criterion to the stand; twice is above its scatter, and
+            // before deep surge.
+            soft_growth_ratio: 2.0,
         }
     }
 }

@@ -274,7 +274,7 @@ impl Ramps {
     /// within the error of its reading.
     pub const AHEAD_SHARE: f64 = 0.03;
     /// Fall of P3, relative, above which the valve waits for it. Bound: a smaller one is not clearly above the noise of its reading.
-    const MIN_FALL_RATIO: f64 = 0.02;
+    const MIN_FALL_RATIO: f64 = 0.01;
 
     /// Whether the valve moves no further than P3 has fallen.
     pub fn valve_waits(from_pa: f64, to_pa: f64) -> bool {

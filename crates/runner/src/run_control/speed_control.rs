@@ -195,6 +195,11 @@ impl<'a> SpeedControl<'a> {
         self.extra_delay_s = self.extra_delay_s.max(delay_s.min(MAX_EXTRA_DELAY_S));
     }
 
+    /// Response of the nominal machine at the current step.
+    pub fn response(&self) -> Option<SpeedResponse> {
+        self.hold.as_ref().map(|hold| hold.response)
+    }
+
     /// Continues from a command other than that with which the step began, Pa, sent at `t_s`.
     pub fn continue_from(&mut self, p3_pa: f64, t_s: f64) {
         if let Some(hold) = &mut self.hold {

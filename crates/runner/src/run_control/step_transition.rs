@@ -2,6 +2,7 @@
 
 use crate::run_control::observer::ObserverError;
 use crate::run_control::run::{Halt, Run};
+use crate::run_control::speed_control::SpeedControl;
 use crate::run_control::transition_control::{Arrival, StandMotion, TransitionControl};
 use mapper_core::{BackendError, Event, EventKind, PlanStep, RigMode, SampleBatch, Setpoints, WindowRule};
 
@@ -40,7 +41,11 @@ impl Run<'_, '_> {
         setpoints: Setpoints,
     ) -> Result<(), BackendError> {
         let control = self.protection.stand.zip(self.sent).and_then(|(stand, before)| {
-            TransitionControl::new(&stand, before, setpoints, (step, self.at), self.now_s)
+            let shaft = self.runner.speed.as_ref().and_then(SpeedControl::response);
+            let rests = !self.p3_motion.is_moving_to(before.p3_pa);
+            let p3_pa = self.p3_motion.p3_pa().filter(|_| rests).unwrap_or(before.p3_pa);
+            let shaft = (shaft, before.p3_pa - p3_pa);
+            TransitionControl::new(&stand, before, setpoints, (step, self.at), shaft, self.now_s)
         });
         self.transition = None;
         self.arrival = self.protection.stand.map(|stand| Arrival {

@@ -1,12 +1,12 @@
 //! Control of a transition: the ramps of P3 and valve, held back by what the stand really does.
 //!
 //! The plan's ramps assume the declared actuators. A stand that is slower than declared is recognised from its readings: when P3 falls, the valve
-//! moves no further than the measured P3 has fallen, and closes no further than the shaft has slowed. When P3 rises, it stops rising while
-//! the shaft is above the higher target.
+//! moves no further than the measured P3 has fallen, and closes no further than the shaft has slowed. When P3 rises, it rises no further than
+//! to the pressure at which the shaft, as it accelerates now, comes to rest at the higher target.
 
 use mapper_core::{
     AvoidedSpeeds, Channel, OperatingPoint, PlanStep, Ramp, Ramps, RigActuators, RigMode, SampleBatch,
-    Setpoints, is_commanded_jump,
+    Setpoints, SpeedResponse, is_commanded_jump,
 };
 use std::collections::VecDeque;
 
@@ -25,19 +25,17 @@ pub struct StandMotion {
 
 /// Time constant of a shaft for ramps without a plan, s. Judgement: turbochargers of passenger cars take half a second to two.
 const USUAL_SHAFT_S: f64 = 1.5;
+/// Relative change of its speed per relative change of P3. Judgement: one at high speeds to three at low ones.
+const USUAL_SENSITIVITY: f64 = 1.5;
 /// Change of the speed, relative, above which the valve waits for the shaft. Judgement: below, the reading is not clearly above its noise.
 const MIN_SPEED_CHANGE_RATIO: f64 = 0.03;
-/// Share of the allowed overshoot at which P3 stops rising. Judgement: the other half is for the delay of the shaft.
+/// Share of the allowed overshoot up to which P3 may rise. Judgement: the rest is for the error of the acceleration.
 const HOLD_OVERSHOOT_SHARE: f64 = 0.25;
-/// Distance from the limit of speed at which P3 stops rising, relative. Judgement: twice the change of a fast shaft in one interval.
+/// Distance of that from the limit of speed, and at which the speed alone holds P3, relative. Judgement: twice the change of a fast shaft in one
+/// interval.
 const LIMIT_DISTANCE_RATIO: f64 = 0.01;
-/// Time over which the speed is extrapolated, s, while slow air arrives beyond its delay, which is limited. Judgement: a third of a shaft's usual
-/// time constant; the rate of a speed says nothing of later.
-const AHEAD_S: f64 = 0.3;
-const MAX_DELAY_S: f64 = 0.5;
-/// Shortest time in which P3 falls back to its start and rises again, s, and in delays of P3. Judgement: a faster one makes the shaft swing.
-const MIN_RETREAT_S: f64 = 3.0;
-const DELAYS_OF_RETREAT: f64 = 2.0;
+/// Range of the time over which the acceleration is measured, s: the shaft's time constant. Judgement: noise is below a tenth of a per cent of the speed.
+const ACCELERATION_S: (f64, f64) = (0.2, 1.0);
 /// Longest search for a pressure at which the shaft keeps its speed, s. Judgement: half of a usual step.
 const MAX_SEARCH_S: f64 = 20.0;
 /// Time after the ramps in which the shaft may overshoot, s. Judgement: three time constants of a usual shaft.
@@ -65,17 +63,20 @@ pub(crate) struct TransitionControl {
     valve_share: f64,
     /// Speeds of the targets before and after, rpm.
     targets_rpm: (f64, f64),
-    /// Readings of P3, Pa, and speed, rpm, at the start.
-    first: (Option<f64>, Option<f64>),
-    latest: (Option<f64>, Option<f64>),
-    /// Times, s, and speeds, rpm, of the last [`AHEAD_S`].
-    speeds: VecDeque<(f64, f64)>,
+    /// The first reading, as in `recent`.
+    first: Option<(f64, f64, f64)>,
+    /// How the shaft follows P3 at the target, without the delay of P3: change of the speed, rpm/Pa, and time constant, s.
+    shaft: Option<(f64, f64)>,
+    /// Command minus reading of P3 at rest, Pa.
+    p3_offset_pa: f64,
+    /// Times, s, speeds, rpm, and readings of P3, Pa, over which the acceleration is measured.
+    recent: VecDeque<(f64, f64, f64)>,
     /// Whether P3 and shaft have come to rest.
     leader_rests: bool,
-    /// Whether P3 has stopped rising where it was, because the shaft was about to exceed its limit.
-    has_stopped: bool,
     /// Time since which the shaft rests above its target, s.
     too_fast_since_s: Option<f64>,
+    /// Time of the last change of P3's command, s.
+    p3_changed_s: f64,
 }
 
 impl TransitionControl {
@@ -86,6 +87,7 @@ impl TransitionControl {
         from: Setpoints,
         to: Setpoints,
         (step, at): (&PlanStep, Option<OperatingPoint>),
+        (shaft, p3_offset_pa): (Option<SpeedResponse>, f64),
         now_s: f64,
     ) -> Option<Self> {
         let is_same = from.p3_pa == to.p3_pa && from.valve_opening_ratio == to.valve_opening_ratio;
@@ -114,18 +116,19 @@ impl TransitionControl {
             p3_share: 0.0,
             valve_share: 0.0,
             targets_rpm: (at.map_or(target_rpm, |at| at.speed_rpm), target_rpm),
-            first: (None, None),
-            latest: (None, None),
-            speeds: VecDeque::new(),
+            first: None,
+            shaft: shaft.map(|of| (of.rpm_per_pa, (of.time_constant_s - stand.actuators.p3.lag_s).max(0.0))),
+            p3_offset_pa,
+            recent: VecDeque::new(),
             leader_rests: false,
-            has_stopped: false,
             too_fast_since_s: None,
+            p3_changed_s: now_s,
         })
     }
 
     /// Interval of the commands, s: a multiple of the shortest, so that samples at 10 Hz show when each was sent.
     pub(crate) fn interval_s(&self) -> f64 {
-        if self.is_sent() && self.is_late() {
+        if self.is_sent() && self.now_s - self.start_s > self.ramps.end_s() + WATCH_S {
             // P3 only arrives.
             return INTERVAL_S.1;
         }
@@ -151,12 +154,16 @@ impl TransitionControl {
         let since_s = self.now_s - self.start_s;
         let watched_s = self.ramps.end_s() + if rises { WATCH_S } else { 0.0 };
         let is_found = match self.p3_share >= 1.0 {
-            true => !(rises && p3_moves && since_s < MAX_WAIT_S),
+            true => {
+                let watched_s = self.p3_changed_s + WATCH_S + self.stand.actuators.p3.dead_time_s;
+                self.now_s >= watched_s && !(p3_moves && since_s < MAX_WAIT_S)
+            }
             false => {
                 let stays_too_fast = self.too_fast_since_s.is_some_and(|from_s| self.now_s - from_s > REST_S);
-                stays_too_fast || self.has_stopped && since_s > watched_s + MAX_SEARCH_S
+                stays_too_fast || since_s > watched_s + MAX_SEARCH_S
             }
         };
+        let is_found = !rises || is_found;
         self.valve_share >= 1.0 && since_s >= watched_s && is_found
     }
 
@@ -178,19 +185,15 @@ impl TransitionControl {
 
     /// Advances to `now_s`, the end of a batch of samples, and returns the next setpoints. `p3_moves`: whether P3 still follows its command.
     pub(crate) fn advance(&mut self, batch: &SampleBatch, now_s: f64, p3_moves: bool) -> Setpoints {
-        let last = |channel: Channel| {
-            batch
-                .column(channel)
-                .and_then(|values| values.iter().rev().copied().find(|value| value.is_finite()))
-        };
-        let (p3_pa, speed_rpm) = (last(Channel::P3), last(Channel::ShaftSpeed));
-        self.latest = (p3_pa.or(self.latest.0), speed_rpm.or(self.latest.1));
-        self.first = (self.first.0.or(p3_pa), self.first.1.or(speed_rpm));
-        let speeds = batch.column(Channel::ShaftSpeed).unwrap_or_default();
-        self.speeds
-            .extend(batch.t_s.iter().copied().zip(speeds.iter().copied()).filter(|(_, rpm)| rpm.is_finite()));
-        while self.speeds.front().is_some_and(|(t_s, _)| *t_s < now_s - AHEAD_S) {
-            self.speeds.pop_front();
+        let column = |channel: Channel| batch.column(channel).unwrap_or_default().iter().copied();
+        let rows = batch.t_s.iter().copied().zip(column(Channel::ShaftSpeed)).zip(column(Channel::P3));
+        let rows = rows.map(|((t_s, rpm), p3_pa)| (t_s, rpm, p3_pa));
+        self.recent.extend(rows.filter(|(_, rpm, p3_pa)| rpm.is_finite() && p3_pa.is_finite()));
+        self.first = self.first.or(self.recent.front().copied());
+        let span_s = self.shaft.map_or(0.0, |(_, time_s)| time_s);
+        let span_s = span_s.clamp(ACCELERATION_S.0, ACCELERATION_S.1);
+        while self.recent.front().is_some_and(|(t_s, ..)| *t_s < now_s - span_s) {
+            self.recent.pop_front();
         }
         let step_s = (now_s - self.now_s).max(0.0);
         self.now_s = now_s;
@@ -198,7 +201,11 @@ impl TransitionControl {
         let is_too_fast =
             self.speed_and_rate().is_some_and(|speed| speed.0 > self.targets_rpm.1 && is_resting(speed));
         self.too_fast_since_s = is_too_fast.then(|| self.too_fast_since_s.unwrap_or(now_s));
+        let share_before = self.p3_share;
         self.advance_p3(step_s);
+        if self.p3_share != share_before {
+            self.p3_changed_s = now_s;
+        }
         self.advance_valve(step_s);
         self.setpoints()
     }
@@ -210,31 +217,26 @@ impl TransitionControl {
             self.p3_share = planned;
             return;
         }
-        // Close to the limit P3 rises more slowly, and beyond it P3 falls: the valve has not arrived yet.
-        let room =
-            self.speed_ahead_rpm().map_or(1.0, |rpm| (1.0 - rpm / self.limit_rpm()) / LIMIT_DISTANCE_RATIO);
-        if self.is_late() && room < 0.0 && !self.has_stopped {
-            self.has_stopped = true;
-            // What P3 has been commanded but has not reached would raise the shaft further.
-            if let (Some(first_pa), Some(latest_pa)) = (self.first.0, self.latest.0) {
-                let reached = (latest_pa - first_pa) / (self.to.p3_pa - self.from.p3_pa);
-                self.p3_share = self.p3_share.min(reached.max(0.0));
-            }
-        }
-        let p3 = &self.stand.actuators.p3;
-        let change_s = match room < 0.0 {
-            _ if self.has_stopped => {
-                ramp_s.max(MIN_RETREAT_S).max(DELAYS_OF_RETREAT * (p3.lag_s + p3.dead_time_s))
-            }
-            true => ramp_s.max(MIN_RETREAT_S),
-            false => ramp_s,
-        };
-        self.p3_share = (self.p3_share + room.clamp(-1.0, 1.0) / change_s * step_s).clamp(0.0, planned);
+        let change_pa = self.to.p3_pa - self.from.p3_pa;
+        let allowed = self.highest_p3_pa().map_or(1.0, |p3_pa| (p3_pa - self.from.p3_pa) / change_pa);
+        // After a hold P3 goes on at the rate of its ramp.
+        let most = self.p3_share + step_s / ramp_s;
+        self.p3_share = planned.min(most).min(allowed).max(0.0);
     }
 
-    /// Whether the ramps are over, and a fast stand would have arrived.
-    fn is_late(&self) -> bool {
-        self.now_s - self.start_s > self.ramps.end_s() + WATCH_S
+    /// The command of P3 with which the shaft comes to rest at its limit: the pressure now, less what its speed and acceleration are above. It holds for
+    /// the opening that the valve has now, however late the air is.
+    fn highest_p3_pa(&self) -> Option<f64> {
+        let (speed_rpm, rate_rpm_s) = self.speed_and_rate()?;
+        let p3_pa = mean(self.recent.iter().map(|(.., p3_pa)| *p3_pa))?;
+        let usual = || {
+            // Without a model of the shaft, only one that is close to its limit holds P3.
+            let is_close = speed_rpm > self.limit_rpm() * (1.0 - LIMIT_DISTANCE_RATIO);
+            is_close.then_some((USUAL_SENSITIVITY * speed_rpm / p3_pa, 0.0))
+        };
+        let (rpm_per_pa, time_s) = self.shaft.or_else(usual)?;
+        let rest_rpm = speed_rpm + time_s * rate_rpm_s;
+        Some(p3_pa + self.p3_offset_pa + (self.limit_rpm() - rest_rpm) / rpm_per_pa)
     }
 
     /// Speed above which P3 stops rising, rpm.
@@ -244,20 +246,14 @@ impl TransitionControl {
         overshoot_rpm.min(self.stand.speed_max_rpm * (1.0 - LIMIT_DISTANCE_RATIO)).max(highest_rpm)
     }
 
-    /// The speed that the shaft reaches soon if it goes on as before, rpm.
-    fn speed_ahead_rpm(&self) -> Option<f64> {
-        let p3 = &self.stand.actuators.p3;
-        let ahead_s =
-            AHEAD_S + if self.is_late() { (p3.lag_s + p3.dead_time_s).min(MAX_DELAY_S) } else { 0.0 };
-        self.speed_and_rate().map(|(now_rpm, rate_rpm_s)| now_rpm + ahead_s * rate_rpm_s.max(0.0))
-    }
-
-    /// The latest speed, rpm, and its rate over the last samples, rpm/s.
+    /// The mean speed over the last samples, rpm, and its rate by their regression, rpm/s.
     fn speed_and_rate(&self) -> Option<(f64, f64)> {
-        let (now_s, now_rpm) = *self.speeds.back()?;
-        let (then_s, then_rpm) = *self.speeds.front()?;
-        let rate_rpm_s = if now_s > then_s { (now_rpm - then_rpm) / (now_s - then_s) } else { 0.0 };
-        Some((now_rpm, rate_rpm_s))
+        let mean_s = mean(self.recent.iter().map(|(t_s, ..)| *t_s))?;
+        let mean_rpm = mean(self.recent.iter().map(|(_, rpm, _)| *rpm))?;
+        let (along, square) = self.recent.iter().fold((0.0, 0.0), |(along, square), (t_s, rpm, _)| {
+            (along + (t_s - mean_s) * (rpm - mean_rpm), square + (t_s - mean_s).powi(2))
+        });
+        Some((mean_rpm, if square > 0.0 { along / square } else { 0.0 }))
     }
 
     fn advance_valve(&mut self, step_s: f64) {
@@ -278,22 +274,14 @@ impl TransitionControl {
             return 1.0;
         }
         // From the readings at the start, which need not be at the last commands.
+        let (Some(first), Some(latest)) = (self.first, self.recent.back()) else { return 1.0 };
         let share = |first: f64, latest: f64, end: f64| {
             if first > end { (first - latest) / (first - end) } else { 1.0 }
         };
-        let p3_share = match (self.first.0, self.latest.0) {
-            (Some(first_pa), Some(latest_pa)) => share(first_pa, latest_pa, self.to.p3_pa),
-            _ => 1.0,
-        };
+        let p3_share = share(first.2, latest.2, self.to.p3_pa);
         let closes = self.to.valve_opening_ratio < self.from.valve_opening_ratio;
-        let speed_share = match (self.first.1, self.latest.1) {
-            (Some(first_rpm), Some(latest_rpm))
-                if closes && self.targets_rpm.1 < first_rpm * (1.0 - MIN_SPEED_CHANGE_RATIO) =>
-            {
-                share(first_rpm, latest_rpm, self.targets_rpm.1)
-            }
-            _ => 1.0,
-        };
+        let slows = self.targets_rpm.1 < first.1 * (1.0 - MIN_SPEED_CHANGE_RATIO);
+        let speed_share = if closes && slows { share(first.1, latest.1, self.targets_rpm.1) } else { 1.0 };
         p3_share.min(speed_share).max(0.0)
     }
 
@@ -424,7 +412,8 @@ mod tests {
         let (from, to) = (point(150e3, 0.5), point(50e3, 2.5));
         let (start, end) = (setpoints(300e3, 0.5), setpoints(130e3, 2.5));
         let plan = step(from, to, 130e3);
-        let mut control = TransitionControl::new(&FAST, start, end, (&plan, Some(from)), 0.0).unwrap();
+        let mut control =
+            TransitionControl::new(&FAST, start, end, (&plan, Some(from)), (None, 0.0), 0.0).unwrap();
         let (mut p3_pa, mut complete_s) = (300e3, f64::INFINITY);
         for tick in 1..=600 {
             let t_s = 0.1 * f64::from(tick);
@@ -441,14 +430,16 @@ mod tests {
         assert_eq!(control.setpoints(), end);
     }
 
-    /// Loading with a valve that does not close: P3 stops and falls before the shaft overshoots much.
+    /// Loading with a valve that does not close: P3 stops before the shaft overshoots much, although the model of the shaft is not its own.
     #[test]
     fn p3_does_not_rise_while_the_shaft_is_too_fast() {
         let point = |speed_rpm, valve_opening_ratio| OperatingPoint { speed_rpm, valve_opening_ratio };
         let (from, to) = (point(100e3, 2.5), point(150e3, 0.5));
         let (start, end) = (setpoints(160e3, 2.5), setpoints(300e3, 0.5));
         let plan = step(from, to, 300e3);
-        let mut control = TransitionControl::new(&FAST, start, end, (&plan, Some(from)), 0.0).unwrap();
+        let shaft = SpeedResponse { rpm_per_pa: 0.5, p3_per_power: 1.0, time_constant_s: 1.3, delay_s: 0.3 };
+        let mut control =
+            TransitionControl::new(&FAST, start, end, (&plan, Some(from)), (Some(shaft), 0.0), 0.0).unwrap();
         let (mut speed_rpm, mut highest_rpm) = (100e3, 0.0f64);
         let mut sent = start;
         for tick in 1..=200 {

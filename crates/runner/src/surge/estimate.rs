@@ -131,18 +131,14 @@ fn row(log_distance: f64) -> Vector3<f64> {
     Vector3::new(1.0, log_distance, log_distance * log_distance)
 }
 
-/// Coefficient of variation at soft surge over that far from surge. Judgement: SAE J1826 (2022) asks for the knee of its growth, and leaves the
-/// criterion to the stand; twice is above its scatter, and before deep surge.
-const SOFT_SURGE_RATIO: f64 = 2.0;
-
-/// Soft surge of a line: where the variation of a pressure has grown by [`SOFT_SURGE_RATIO`], between two openings. `None` without fast
-/// samples, and if it has not grown.
-pub(crate) fn soft_surge(readings: &[SurgeReading]) -> Option<SoftSurge> {
+/// Soft surge of a line: where the variation of a pressure has grown by `growth_ratio`, between two openings. `None` without fast samples, and if
+/// it has not grown.
+pub(crate) fn soft_surge(readings: &[SurgeReading], growth_ratio: f64) -> Option<SoftSurge> {
     let fast: Vec<(&SurgeReading, f64)> =
         readings.iter().filter_map(|reading| Some((reading, reading.fast_variation?.1))).collect();
     let (channel, _) = readings.iter().find_map(|reading| reading.fast_variation)?;
     let quiet_ratio = mean(fast.iter().take(QUIET_READINGS).map(|(_, ratio)| *ratio))?;
-    let variation_ratio = SOFT_SURGE_RATIO * quiet_ratio;
+    let variation_ratio = growth_ratio * quiet_ratio;
     let last = readings.last()?;
     // One value beyond may be chance.
     let stays = |from: usize| fast[from..].iter().all(|(_, ratio)| *ratio >= variation_ratio);

@@ -43,7 +43,14 @@ pub struct SurgeMarks {
 }
 
 /// The marks of all approaches to surge in a recording.
-pub fn find_surge_marks(recording: &Recording, reference: ReferenceState, errors: SurgeErrors) -> SurgeMarks {
+///
+/// `soft_growth_ratio` is [`SurgeSearchSettings::soft_growth_ratio`](mapper_core::SurgeSearchSettings::soft_growth_ratio).
+pub fn find_surge_marks(
+    recording: &Recording,
+    reference: ReferenceState,
+    errors: SurgeErrors,
+    soft_growth_ratio: f64,
+) -> SurgeMarks {
     let mut found = SurgeMarks::default();
     for approach in group_approaches(&recording.steps) {
         let entered = |step: &&StepMarker| {
@@ -63,7 +70,9 @@ pub fn find_surge_marks(recording: &Recording, reference: ReferenceState, errors
         let target_speed_rpm = approach.first().and_then(|step| step.to).map_or(0.0, |to| to.speed_rpm);
         match mark_approach(&readings, target_speed_rpm, surged.map(|step| step.valve_opening_ratio), errors)
         {
-            Ok(mark) => found.marks.push(mark),
+            Ok(mark) => {
+                found.marks.push(SurgeMark { soft: soft_surge(&readings, soft_growth_ratio), ..mark });
+            }
             Err(not_found) => found.remarks.push(not_found),
         }
     }
@@ -131,7 +140,7 @@ fn mark_approach(
         closest_end_s: last.end_s,
         found_by: if surged_at_ratio.is_some() { SurgeFoundBy::Surge } else { SurgeFoundBy::Precursor },
         steps: readings.len(),
-        soft: soft_surge(readings),
+        soft: None,
     })
 }
 

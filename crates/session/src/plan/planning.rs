@@ -250,7 +250,8 @@ pub(crate) fn find_surge_marks(
     let errors = campaign.map_or_else(SurgeErrors::default, |campaign| {
         SurgeErrors::of(&declared(campaign, &ChannelMap::native()))
     });
-    surge::find_surge_marks(approaches, config.reference, errors)
+    let search = campaign.and_then(|campaign| campaign.surge_search).unwrap_or_default();
+    surge::find_surge_marks(approaches, config.reference, errors, search.soft_growth_ratio)
 }
 
 /// Maximum size of a plan file, bytes.

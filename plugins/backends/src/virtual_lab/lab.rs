@@ -127,6 +127,7 @@ impl Backend for VirtualLab {
                 t3: Actuator::at_rest(settings.t3_actuator, cell.t3_k),
                 valve: Actuator::at_rest(settings.valve_actuator, cell.valve_opening_ratio),
                 oil: Actuator::at_rest(settings.oil_actuator, cell.oil_temperature_k),
+                sag: settings.sag_at_rest(cell.p4_pa * MIN_EXPANSION_RATIO),
             },
             machine: match settings.start {
                 Start::Standstill => Some(Machine::Standstill { state: at_rest, t_s: 0.0 }),
@@ -175,8 +176,8 @@ impl Backend for VirtualLab {
         };
         let opening_ratio = settings.instruments.valve.reached(setpoints.valve_opening_ratio);
         let is_first = armed.machine.is_none();
+        armed.inputs.set_p3(now_s, p3_pa);
         for (actuator, command) in [
-            (&mut armed.inputs.p3, p3_pa),
             (&mut armed.inputs.t3, setpoints.t3_k),
             (&mut armed.inputs.valve, opening_ratio),
             (&mut armed.inputs.oil, setpoints.oil_temperature_k),
@@ -189,6 +190,7 @@ impl Backend for VirtualLab {
             armed.inputs.t3 = Actuator::at_rest(settings.t3_actuator, setpoints.t3_k);
             armed.inputs.valve = Actuator::at_rest(settings.valve_actuator, opening_ratio);
             armed.inputs.oil = Actuator::at_rest(settings.oil_actuator, setpoints.oil_temperature_k);
+            armed.inputs.sag = settings.sag_at_rest(p3_pa);
             armed.machine = Some(settle(settings, armed, now_s)?);
         } else if let Some(Machine::Running(simulator)) = armed.machine.as_mut() {
             simulator.restart();
@@ -209,7 +211,7 @@ impl Backend for VirtualLab {
         let (settings, armed) = self.armed("make_safe")?;
         let now_s = armed.now_s;
         armed.requested_mode = RigMode::Standstill;
-        armed.inputs.p3.set(now_s, armed.inputs.cell.p4_pa * MIN_EXPANSION_RATIO);
+        armed.inputs.set_p3(now_s, armed.inputs.cell.p4_pa * MIN_EXPANSION_RATIO);
         armed.inputs.valve.set(now_s, 1.0f64.max(armed.inputs.valve.value(now_s)));
         if let Some(Machine::Running(simulator)) = armed.machine.as_mut() {
             simulator.restart();
@@ -323,6 +325,10 @@ impl ArmedLab {
         }
         let first_index = self.next_sequence + batch.len() as u64;
         let rate_hz = settings.sample_rate_hz;
+        if settings.inlet_loss_pa > 0.0 {
+            // P1 follows the flow from sample to sample.
+            end_s = end_s.min(first_index as f64 / rate_hz);
+        }
         let mut sample_times_s =
             (first_index..).map(|index| index as f64 / rate_hz).take_while(|t| *t <= end_s);
         let ArmedLab { inputs, machine, sensor_bank, commands, .. } = self;
@@ -333,7 +339,7 @@ impl ArmedLab {
                 needed: "given its first setpoints (`set`)",
             }),
             Some(Machine::Running(simulator)) => {
-                let mut crossings = Vec::new();
+                let (mut crossings, mut flow_kg_s) = (Vec::new(), None);
                 let result = simulator.run_to(
                     end_s,
                     inputs,
@@ -347,9 +353,14 @@ impl ArmedLab {
                             running: Some((state, outputs)),
                         };
                         batch.push(t_s, &instant, commands.as_ref(), sensor_bank, settings);
+                        flow_kg_s = Some(outputs.flow_kg_s);
                     },
                     &mut |event| crossings.push(event),
                 );
+                if let Some(flow_kg_s) = flow_kg_s.filter(|_| settings.inlet_loss_pa > 0.0) {
+                    let lost = (flow_kg_s / LabSettings::LOSS_FLOW_KG_S).powi(2);
+                    inputs.cell.p1_pa = settings.cell.p1_pa - settings.inlet_loss_pa * lost;
+                }
                 for crossing in crossings {
                     self.report(settings, crossing, end_s);
                 }
@@ -365,6 +376,7 @@ impl ArmedLab {
             }
             Some(Machine::Standstill { state, t_s: state_s }) => {
                 let params = &settings.model.params;
+                inputs.cell.p1_pa = settings.cell.p1_pa;
                 let ambient_k = inputs.cell.ambient_temperature_k;
                 let mut relax_to = |t_s: f64| {
                     let oil_k = inputs.oil.value(t_s);
@@ -417,7 +429,7 @@ impl ArmedLab {
         if crossing == Crossing::OverspeedEntered {
             self.tripped = true;
             self.requested_mode = RigMode::Standstill;
-            self.inputs.p3.set(now_s, self.inputs.cell.p4_pa * MIN_EXPANSION_RATIO);
+            self.inputs.set_p3(now_s, self.inputs.cell.p4_pa * MIN_EXPANSION_RATIO);
         }
         self.pending_events.push(Event { t_s, kind, message });
         if crossing == Crossing::OverspeedEntered {

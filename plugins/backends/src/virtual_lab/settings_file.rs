@@ -3,7 +3,7 @@
 use crate::virtual_lab::effects_file::{
     EffectValues, FaultFile, SettingProblem, apply_effects, check_range, read_elements,
 };
-use crate::virtual_lab::rig::actuator::ActuatorDynamics;
+use crate::virtual_lab::rig::actuator::{Actuator, ActuatorDynamics};
 use crate::virtual_lab::rig::drift::{DriftFile, LabDrift, Weather, draw_tolerances, read_drifts};
 use crate::virtual_lab::rig::running::{Lumped, Structure, SurgePrecursor};
 use crate::virtual_lab::sensors::{Draws, LabElements, SecondOrder, SensorErrors, draw, offset_kind};
@@ -14,8 +14,8 @@ use mapper_physics::rig::effect::Rig;
 use mapper_physics::rig::instruments::Instruments;
 use mapper_physics::simulation::model::Model;
 use mapper_yaml::units::{
-    Conductance, Dimension, Duration, Fraction, Frequency, Length, PressureRate, Quantity, RatioRate, Speed,
-    TemperatureRate,
+    Conductance, Dimension, Duration, Fraction, Frequency, Length, Pressure, PressureRate, Quantity,
+    RatioRate, Speed, TemperatureDifference, TemperatureRate,
 };
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -55,6 +55,10 @@ struct SettingsFile {
     deviations: DeviationsFile,
     /// Dynamics of the actuators.
     actuators: ActuatorsFile,
+    /// Fall of T3 when P3 rises by 100 kPa at once, which goes as T3 follows; none by default.
+    heater_sag: Option<Quantity<TemperatureDifference>>,
+    /// Loss of P1 at a compressor flow of 0.1 kg/s, with the square of the flow; none by default.
+    inlet_loss: Option<Quantity<Pressure>>,
     /// Differences of the true machine from the declared one.
     machine: MachineFile,
     /// Shaft speed at which the lab cuts its own air; default 1.1 times the campaign's limit.
@@ -191,6 +195,10 @@ pub fn read_settings(
     let fast_rate_hz = file.fast_rate.map(|rate| rate.value);
     check_range(fast_rate_hz.unwrap_or(1e3), "Hz", 100.0..=10e3)
         .map_err(|problem| problem.at("fast_rate"))?;
+    let heater_sag_k = file.heater_sag.map_or(0.0, |sag| sag.value);
+    check_range(heater_sag_k, "K", 0.0..=200.0).map_err(|problem| problem.at("heater_sag"))?;
+    let inlet_loss_pa = file.inlet_loss.map_or(0.0, |loss| loss.value);
+    check_range(inlet_loss_pa, "Pa", 0.0..=20e3).map_err(|problem| problem.at("inlet_loss"))?;
     let surge_swing_ratio = file.surge_swing.map_or(0.08, |swing| swing.value);
     check_range(100.0 * surge_swing_ratio, "%", 0.0..=100.0).map_err(|problem| problem.at("surge_swing"))?;
     let mut rig = Rig::new(model);
@@ -231,6 +239,8 @@ pub fn read_settings(
             )?,
             ..actuators.valve.dynamics("valve", &declared.valve)?
         },
+        heater_sag_k,
+        inlet_loss_pa,
         oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", &OIL_MOTION)?,
         sensors: draw_sensors(&offset_of, nominal, &draws),
         redundant: read_elements(&file.faults, nominal, &draws, &offset_of)?,
@@ -406,6 +416,10 @@ pub struct LabSettings {
     pub valve_actuator: ActuatorDynamics,
     /// Oil temperature, K.
     pub oil_actuator: ActuatorDynamics,
+    /// Fall of T3 when P3 rises at once by [`LabSettings::SAG_JUMP_PA`], K.
+    pub heater_sag_k: f64,
+    /// Loss of P1 at [`LabSettings::LOSS_FLOW_KG_S`], Pa.
+    pub inlet_loss_pa: f64,
     /// Errors of the sensors; channels without an entry are ideal.
     pub sensors: BTreeMap<Channel, SensorErrors>,
     /// Channels with redundant sensors, which replace the one in `sensors`.
@@ -431,6 +445,18 @@ pub struct LabSettings {
 }
 
 impl LabSettings {
+    /// Rise of P3 of the stated sag, Pa, and compressor flow of the stated loss, kg/s. Source: definition.
+    pub const SAG_JUMP_PA: f64 = 100e3;
+    /// See [`LabSettings::SAG_JUMP_PA`].
+    pub const LOSS_FLOW_KG_S: f64 = 0.1;
+
+    /// The sag of T3 at rest at a P3, Pa: it goes with the lag of T3.
+    pub(crate) fn sag_at_rest(&self, p3_pa: f64) -> Option<(f64, Actuator)> {
+        let followed = ActuatorDynamics::new(self.t3_actuator.lag_s, f64::INFINITY);
+        (self.heater_sag_k > 0.0)
+            .then(|| (self.heater_sag_k / Self::SAG_JUMP_PA, Actuator::at_rest(followed, p3_pa)))
+    }
+
     /// Takes machine and instruments from a rig; the additional motion of P3 and valve goes to their actuators.
     pub fn take(&mut self, rig: Rig) {
         let slower_s = rig.instruments.p3_lag_s - mapper_physics::rig::instruments::NOMINAL_P3_LAG_S;
@@ -457,6 +483,8 @@ impl LabSettings {
             t3_actuator: at_once,
             valve_actuator: at_once,
             oil_actuator: at_once,
+            heater_sag_k: 0.0,
+            inlet_loss_pa: 0.0,
             sensors: BTreeMap::new(),
             redundant: BTreeMap::new(),
             uneven_at_rest: BTreeMap::new(),

@@ -126,6 +126,8 @@ pub struct LabInputs {
     pub valve: Actuator,
     /// Oil temperature, K.
     pub oil: Actuator,
+    /// The heater follows more air late: fall of T3, K/Pa of P3 above the P3 that it has followed, and that P3.
+    pub sag: Option<(f64, Actuator)>,
 }
 
 impl LabInputs {
@@ -139,19 +141,29 @@ impl LabInputs {
             t3: at_rest(boundary.t3_k),
             valve: at_rest(boundary.valve_opening_ratio),
             oil: at_rest(boundary.oil_temperature_k),
+            sag: None,
         }
     }
 
-    fn actuators(&self) -> [&Actuator; 4] {
-        [&self.p3, &self.t3, &self.valve, &self.oil]
+    /// Commands a P3, Pa.
+    pub fn set_p3(&mut self, now_s: f64, p3_pa: f64) {
+        self.p3.set(now_s, p3_pa);
+        self.sag.iter_mut().for_each(|(_, followed)| followed.set(now_s, p3_pa));
+    }
+
+    fn actuators(&self) -> impl Iterator<Item = &Actuator> {
+        let all = [&self.p3, &self.t3, &self.valve, &self.oil].into_iter();
+        all.chain(self.sag.iter().map(|(_, followed)| followed))
     }
 }
 
 impl Inputs for LabInputs {
     fn at(&self, t_s: f64) -> BoundaryConditions {
+        let p3_pa = self.p3.value(t_s);
+        let sag_k = |(k_per_pa, followed): &(f64, Actuator)| k_per_pa * (p3_pa - followed.value(t_s));
         let mut boundary = BoundaryConditions {
-            p3_pa: self.p3.value(t_s),
-            t3_k: self.t3.value(t_s),
+            p3_pa,
+            t3_k: self.t3.value(t_s) - self.sag.as_ref().map_or(0.0, sag_k),
             valve_opening_ratio: self.valve.value(t_s),
             oil_temperature_k: self.oil.value(t_s),
             ..self.cell
@@ -164,11 +176,11 @@ impl Inputs for LabInputs {
     }
 
     fn next_kink_s(&self, t_s: f64) -> f64 {
-        self.actuators().map(|actuator| actuator.next_kink_s(t_s)).into_iter().fold(f64::INFINITY, f64::min)
+        self.actuators().map(|actuator| actuator.next_kink_s(t_s)).fold(f64::INFINITY, f64::min)
     }
 
     fn is_constant_after(&self, t_s: f64) -> bool {
-        self.weather.is_calm() && self.actuators().iter().all(|actuator| actuator.has_arrived(t_s))
+        self.weather.is_calm() && self.actuators().all(|actuator| actuator.has_arrived(t_s))
     }
 }
 

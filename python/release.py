@@ -159,7 +159,7 @@ def fill(files: Path, triple: str) -> None:
         copy(ROOT / name, files / "share/mapper" / name)
     for name in ("LICENSE-APACHE", "LICENSE-MIT", "CHANGELOG.md"):
         copy(ROOT / name, documents / name)
-    features = ["--features", "parquet,tdms", "--spec-version", "1.5"]
+    features = ["--features", "hdf5,parquet,tdms", "--spec-version", "1.5"]
     run(CARGO, "cyclonedx", "--format", "json", "--no-build-deps", "--target", triple, *features, "--quiet")
     for one in metadata(triple):
         home = Path(one["manifest_path"]).parent

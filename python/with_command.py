@@ -34,7 +34,7 @@ def add_programs(packages: list[str]) -> None:
     os.environ["CARGO_PROFILE_RELEASE_STRIP"] = "symbols"
     cargo = [os.environ.get("CARGO", "cargo"), "build", "--release", "--locked"]
     chosen = [word for package in packages for word in ("--package", package)]
-    features = ["--features", "mapper-cli/parquet,mapper-cli/tdms"]
+    features = ["--features", "mapper-cli/hdf5,mapper-cli/parquet,mapper-cli/tdms"]
     built = subprocess.run(
         [*cargo, "--bins", *chosen, *features, "--message-format=json-render-diagnostics"],
         cwd=ROOT,

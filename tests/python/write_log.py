@@ -15,6 +15,7 @@ FORMAT is one of
   tdms_time npTDMS: one group a device, each with a channel of seconds
   tdms_date npTDMS: the same with a channel of dates
   mat       SciPy: a structure of vectors, compressed; SI units in the names
+  mat73     h5py: the same as `save -v7.3` lays it out
   parquet   polars: names with units in brackets, seconds
   arrow     polars: the same as Arrow's file, with dates instead of seconds
 
@@ -134,13 +135,33 @@ def frame(times, groups, name):
     return polars.DataFrame({name: times} | {f"{name} [{unit}]": values for name, (values, unit) in flat(groups).items()})
 
 
+def variables(times, groups):
+    """The name of a variable has no brackets: the unit stands behind it."""
+    words = {"rpm": "_rpm", "kg/s": "_kg_s", "Pa": "_Pa", "K": "_kelvin"}
+    columns = {f"{name}{words.get(unit, '')}": values for name, (values, unit) in flat(groups).items()}
+    return {"time_s": times} | columns
+
+
+def write_mat73(target, times, groups):
+    import h5py
+
+    with h5py.File(target, "x", userblock_size=512) as file:
+        text = file.create_dataset("comment", data=np.array([[ord(letter)] for letter in "not a number"], dtype="u2"))
+        text.attrs["MATLAB_class"] = np.bytes_("char")
+        log = file.create_group("log")
+        log.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name, values in variables(times, groups).items():
+            column = log.create_dataset(name, data=values[None, :], compression="gzip", chunks=True)
+            column.attrs["MATLAB_class"] = np.bytes_("double")
+    with open(target, "r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Tue Dec  1 10:00:00 2026 HDF5 schema 1.00 .".ljust(124))
+        stream.write(b"\x00\x02IM")
+
+
 def write_mat(target, times, groups):
     import scipy.io
 
-    # The name of a variable has no brackets: the unit stands behind it.
-    words = {"rpm": "_rpm", "kg/s": "_kg_s", "Pa": "_Pa", "K": "_kelvin"}
-    columns = {f"{name}{words.get(unit, '')}": values for name, (values, unit) in flat(groups).items()}
-    log = {"time_s": times} | columns
+    log = variables(times, groups)
     scipy.io.savemat(target, {"log": log, "comment": "not a number", "rig": 7.0}, do_compression=True, long_field_names=True)
 
 
@@ -261,6 +282,8 @@ def write(target, kind, times, groups):
             write_mdf(target, times, groups, "3.30")
         case "tdms" | "tdms_time" | "tdms_date":
             write_tdms(target, times, groups, {"tdms_time": np.asarray, "tdms_date": stamps}.get(kind))
+        case "mat73":
+            write_mat73(target, times, groups)
         case "mat":
             write_mat(target, times, groups)
         case "parquet":

@@ -42,6 +42,7 @@ pub fn assemble(
         method,
         efficiency: None,
         gas: None,
+        wheel_diameter_m: None,
         lines,
         surge: Vec::new(),
         fitted: None,

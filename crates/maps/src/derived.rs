@@ -78,6 +78,7 @@ pub fn scaled(mut map: CompressorMap, scale: MapScale) -> Result<CompressorMap, 
         return Err(ScaleError::NotPositive { quantity, factor });
     }
     map.fitted = None;
+    map.wheel_diameter_m = map.wheel_diameter_m.filter(|_| speed == 1.0 && flow == 1.0);
     map.scale_corrected(speed, flow);
     let ratio = |value: f64| 1.0 + pressure_ratio * (value - 1.0);
     for SpeedLine { speed_corrected_rpm, target_speed_rpm, points, .. } in &mut map.lines {

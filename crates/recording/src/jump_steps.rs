@@ -83,6 +83,12 @@ pub(crate) fn drop_rest_steps(steps: Vec<StepMarker>, series: &BTreeMap<Channel,
     turning.enumerate().map(|(index, step)| StepMarker { index, ..step }).collect()
 }
 
+/// Whether the shaft is at rest over a window before a time.
+pub(crate) fn is_at_rest_before(series: &BTreeMap<Channel, Series>, t_s: f64) -> bool {
+    let speed = series.get(&Channel::ShaftSpeed);
+    speed.is_some_and(|speed| median(speed, t_s - WINDOW_S, t_s) < MAX_REST_RPM)
+}
+
 /// NaN without readings.
 fn median(series: &Series, start_s: f64, end_s: f64) -> f64 {
     let values = series.slice(start_s, end_s).1.iter().filter(|value| value.is_finite());
@@ -350,6 +356,26 @@ mod tests {
             found.shown,
             [(Channel::ValveCommand, 1), (Channel::ShaftSpeed, 3), (Channel::CompressorFlow, 3)]
         );
+    }
+
+    /// Both commands have their first values long before the start at 100 s; the second point begins at 160 s.
+    #[test]
+    fn the_start_from_standstill_is_a_step_although_its_commands_were_given_before() {
+        let mut series = run(&[(0.0, 0.0), (100.0, 90e3), (160.0, 120e3)], 220.0);
+        let speed = series[&Channel::ShaftSpeed].clone();
+        let flow = speed.values.iter().map(|rpm| 1e-6 * rpm).collect();
+        series.insert(Channel::CompressorFlow, Series { values: flow, ..speed.clone() });
+        let p3 = speed.t_s.iter().map(|t_s| if *t_s < 160.0 { 150e3 } else { 200e3 }).collect();
+        series.insert(Channel::P3Command, Series { values: p3, ..speed.clone() });
+        let valve = vec![0.5; speed.t_s.len()];
+        series.insert(Channel::ValveCommand, Series { values: valve, ..speed });
+        let commands = [Channel::P3Command, Channel::ValveCommand];
+        let mut warnings = Vec::new();
+        let steps = drop_rest_steps(find_steps(&series, &commands, false, &mut warnings), &series);
+        let starts_s: Vec<f64> = steps.iter().map(|step| step.start_s.round()).collect();
+        assert!(starts_s.len() == 2 && (starts_s[0] - 100.0).abs() <= 1.0, "{starts_s:?}");
+        assert_eq!(starts_s[1], 160.0);
+        assert_eq!(warnings, [], "commands and readings agree");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::ReadWarning;
 use crate::error::StepsFound;
-use crate::jump_steps::{Jump, can_be_searched, drop_rest_steps, find_jumps};
+use crate::jump_steps::{Jump, can_be_searched, drop_rest_steps, find_jumps, is_at_rest_before};
 use mapper_core::{
     Channel, Group, OperatingPoint, SLOW_JUMP_MULTIPLE, Series, StepKind, StepMarker, is_same_command,
     jump_ratio,
@@ -121,12 +121,17 @@ pub(crate) fn find_steps(
     let only_measured = |jump: &&Jump| {
         jump.channels.len() >= enough && !commanded.iter().any(|commanded| is_same(jump, commanded))
     };
-    let of_readings: Vec<f64> = measured.iter().filter(only_measured).map(|jump| jump.start_s).collect();
+    let (of_starts, of_readings): (Vec<f64>, Vec<f64>) = measured
+        .iter()
+        .filter(only_measured)
+        .map(|jump| jump.start_s)
+        .partition(|start_s| is_at_rest_before(series, *start_s));
     // Start of each step, and the time at which its commands have reached their values.
     let mut jumps_s: Vec<(f64, f64)> = commanded.clone();
-    // With both commands recorded, a jump of the readings alone, such as the start from standstill, is reported but begins no step.
+    // With both commands recorded, a jump of the readings alone is reported but begins no step. The start from standstill does: its commands
+    // may have been given long before.
     let is_complete = p3.is_some() && valve.is_some();
-    let further = of_readings.iter().filter(|_| !is_complete);
+    let further = of_starts.iter().chain(of_readings.iter().filter(|_| !is_complete));
     jumps_s.extend(further.map(|start_s| (*start_s, *start_s)));
     jumps_s.push((first_s, first_s));
     jumps_s.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -6,7 +6,7 @@ use mapper_chart::{
 };
 use mapper_core::{CompressorMap, IdentifiedPoint, Verdict, half_width_95};
 use mapper_history::{ListedRun, Metric, median};
-use mapper_maps::{MapComparison, PlaceComparison};
+use mapper_maps::{MapComparison, PlaceComparison, SpeedLineComparison};
 use mapper_recording::score::ScoredPoint;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -164,11 +164,12 @@ fn map_panel(
     let mut panel =
         Panel::new(Axis::new("corrected mass flow, kg/s"), Axis::new("total pressure ratio P2/P1"))
             .title("(a) points of both; lines of the second, coloured where they differ");
-    for line in &comparison.lines {
+    for line in &second.lines {
         let speed = format!("{:.0}", line.speed_corrected_rpm / 1000.0);
-        let places: Vec<(f64, f64)> =
-            line.places.iter().map(|p| (p.flow_corrected_kg_s, p.pressure_ratio)).collect();
-        panel.add(Line::new(places, palette::GREY).width_px(1.2).end_label(speed, LineEnd::First));
+        let points = line.points.iter().map(|p| (p.flow_corrected_kg_s, p.pressure_ratio)).collect();
+        panel.add(Line::new(points, palette::GREY).width_px(1.2).end_label(speed, LineEnd::Last));
+    }
+    for line in &comparison.lines {
         let differs = |p: &PlaceComparison| p.line_differs() || p.eta_differs();
         // A place without a difference interrupts the coloured line.
         let coloured: Vec<(f64, f64)> = line
@@ -198,15 +199,8 @@ fn map_panel(
 }
 
 fn eta_panel(comparison: &MapComparison) -> Panel {
-    let mut panel =
-        Panel::new(Axis::new("corrected mass flow, kg/s"), Axis::new("difference of efficiency, points"))
-            .title("(b) efficiency, second minus first, with its 95 % interval")
-            .with(Rule::new(RuleAt::Y(0.0)));
-    let last = comparison.lines.len().saturating_sub(1).max(1) as f64;
-    for (index, line) in comparison.lines.iter().enumerate() {
-        let colour = palette::sequential(index as f64 / last);
-        let points: Vec<ScatterPoint> = line
-            .places
+    let of_line = |(index, line): (usize, &SpeedLineComparison)| -> Vec<ScatterPoint> {
+        line.places
             .iter()
             .enumerate()
             .map(|(place, p)| {
@@ -215,7 +209,21 @@ fn eta_panel(comparison: &MapComparison) -> Panel {
                 let y_interval = (place % BAR_EVERY == index % BAR_EVERY).then_some((y - half, y + half));
                 ScatterPoint { x: p.flow_corrected_kg_s, y, x_interval: None, y_interval }
             })
-            .collect();
+            .collect()
+    };
+    let lines: Vec<Vec<ScatterPoint>> = comparison.lines.iter().enumerate().map(of_line).collect();
+    // The axis has all bars: a difference is judged by them.
+    let ends = lines.iter().flatten().map(|point| point.y_interval.unwrap_or((point.y, point.y)));
+    // Without lines both are NaN, and the axis follows the data.
+    let (low, high) =
+        ends.fold((f64::NAN, f64::NAN), |ends, (low, high)| (ends.0.min(low), ends.1.max(high)));
+    let axis = Axis::new("difference of efficiency, points").range(low, high);
+    let mut panel = Panel::new(Axis::new("corrected mass flow, kg/s"), axis)
+        .title("(b) efficiency, second minus first, with its 95 % interval")
+        .with(Rule::new(RuleAt::Y(0.0)));
+    let last = lines.len().saturating_sub(1).max(1) as f64;
+    for (index, (line, points)) in comparison.lines.iter().zip(lines).enumerate() {
+        let colour = palette::sequential(index as f64 / last);
         let label = format!("{:.0} krpm", line.speed_corrected_rpm / 1000.0);
         panel.add(Line::new(points.iter().map(|p| (p.x, p.y)).collect(), colour).label(&label));
         panel.add(Scatter::new(points, colour).size_px(5.0).label(&label));

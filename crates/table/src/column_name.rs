@@ -51,6 +51,12 @@ impl ColumnName {
     /// Reads a name.
     pub fn read(name: &str) -> ColumnName {
         let name: String = name.trim().chars().take(MAX_NAME_LETTERS).collect();
+        // `Tc_in` is T before the compressor, `TC` alone the turbocharger.
+        let is_tc = |side: &str| matches!(side.trim_start_matches(['_', '-', ' ']), "in" | "out");
+        let name = match name.to_lowercase().strip_prefix("tc") {
+            Some(side) if is_tc(side) => format!("t c {side}"),
+            _ => name,
+        };
         let (tag, rest) = split_tag(&name).map_or((None, name.as_str()), |(tag, rest)| (Some(tag), rest));
         ColumnName { tokens: parts_of(rest), tag }
     }

@@ -34,7 +34,8 @@ pub use text::{
 };
 pub use units::{
     HeaderUnit, Reference, bare_unit, difference, header_unit, is_dimensionless, is_reduced_unit, is_unit,
-    is_units_row, is_units_row_of_names, kind_of, parse_quantity, remedy, split_unit, unit, volume_flow_m3_s,
+    is_units_row, is_units_row_of_names, joined_units, kind_of, parse_quantity, remedy, split_unit, unit,
+    volume_flow_m3_s, with_unknown_units,
 };
 pub use workbook::{Book, SheetRows, Value, decimal_sign_of_cells, is_workbook};
 pub use xls::{Cell, Sheet, XLS_MAGIC, read_xls};

@@ -1,4 +1,4 @@
-//! MATLAB data of level 5 (`save`, `save -v7`): arrays of numbers, also in structures.
+//! MATLAB data of level 5 (`save`, `save -v7`): arrays of numbers, also in structures; and of version 7.3, which are HDF5, if compiled in.
 //!
 //! Format: MathWorks, MAT-File Format (2005-2024), chapter 1. Texts, cells, objects and complex or sparse numbers are left out.
 
@@ -46,13 +46,21 @@ pub struct MatFile {
     pub left_out: usize,
 }
 
-/// Whether a file begins as MATLAB data of level 5 do. Octave and SciPy write the same words.
+/// Whether a file begins as MATLAB data do: Octave and SciPy write the same words at level 5. Of version 7.3 only if HDF5 is compiled in.
 pub fn is_mat5(head: &[u8]) -> bool {
+    #[cfg(feature = "hdf5")]
+    if hdf5::recognises(head) {
+        return true;
+    }
     head.starts_with(b"MATLAB 5.0 MAT-file")
 }
 
 /// Reads a file whose content takes at most `max_memory_bytes`.
 pub fn read_mat5(bytes: &[u8], max_memory_bytes: u64) -> Result<MatFile, String> {
+    #[cfg(feature = "hdf5")]
+    if hdf5::recognises(bytes) {
+        return hdf5::read(bytes, max_memory_bytes);
+    }
     let is_big = bytes.get(126) == Some(&b'M');
     let mut reader = Reader { is_big, left: max_memory_bytes, file: MatFile::default() };
     reader.elements(bytes.get(HEADER..).unwrap_or_default(), "", 0)?;
@@ -217,5 +225,77 @@ impl Reader {
             13 => of!(u64),
             other => return Err(format!("numbers of the unknown type {other}")),
         })
+    }
+}
+
+#[cfg(feature = "hdf5")]
+mod hdf5 {
+    use super::{MAX_ARRAYS, MAX_DEPTH, MatArray, MatFile};
+    use hdf5_pure::{AttrValue, Error, File, Group};
+
+    /// Whether a file is HDF5, which MATLAB puts behind a header of its own. Source: the formats.
+    pub(super) fn recognises(head: &[u8]) -> bool {
+        head.starts_with(b"\x89HDF\r\n\x1a\n") || head.starts_with(b"MATLAB 7.3 MAT-file")
+    }
+
+    /// Reads a file whose numbers take at most `max_memory_bytes`.
+    pub(super) fn read(bytes: &[u8], max_memory_bytes: u64) -> Result<MatFile, String> {
+        let file = File::from_bytes(bytes.to_vec()).map_err(|error| error.to_string())?;
+        let mut found = MatFile::default();
+        let mut left = max_memory_bytes;
+        let is_matlab = !bytes.starts_with(b"\x89HDF");
+        walk(&file.root(), "", (0, is_matlab), &mut left, &mut found).map_err(|error| error.to_string())?;
+        Ok(found)
+    }
+
+    fn walk(
+        group: &Group,
+        prefix: &str,
+        (depth, is_matlab): (usize, bool),
+        left: &mut u64,
+        found: &mut MatFile,
+    ) -> Result<(), Error> {
+        for name in group.datasets()? {
+            let dataset = group.dataset(&name)?;
+            let shape = dataset.shape()?;
+            let count = shape.iter().try_fold(1u64, |product, length| product.checked_mul(*length));
+            let taken = count.and_then(|count| count.checked_mul(size_of::<f64>() as u64));
+            let is_text = match dataset.attrs()?.get("MATLAB_class") {
+                Some(AttrValue::String(class) | AttrValue::AsciiString(class)) => {
+                    matches!(class.as_str(), "char" | "cell" | "function_handle")
+                }
+                _ => false,
+            };
+            let Some(rest) = taken.and_then(|taken| left.checked_sub(taken)).filter(|_| !is_text) else {
+                found.left_out += 1;
+                continue;
+            };
+            match dataset.read_f64() {
+                Ok(values) if found.arrays.len() < MAX_ARRAYS => {
+                    *left = rest;
+                    found.arrays.push(array(format!("{prefix}{name}"), &shape, values, is_matlab));
+                }
+                _ => found.left_out += 1,
+            }
+        }
+        // MATLAB keeps what cells refer to in groups of their own.
+        for name in group.groups()?.iter().filter(|name| !name.starts_with('#') && depth < MAX_DEPTH) {
+            walk(&group.group(name)?, &format!("{prefix}{name}."), (depth + 1, is_matlab), left, found)?;
+        }
+        Ok(())
+    }
+
+    /// MATLAB writes its columns one after the other, and others their rows.
+    fn array(name: String, shape: &[u64], values: Vec<f64>, is_matlab: bool) -> MatArray {
+        let length = |length: Option<&u64>| length.map_or(1, |length| *length as usize).max(1);
+        if is_matlab || shape.len() < 2 {
+            let rows = length(shape.last());
+            return MatArray { name, rows, columns: values.len() / rows, values };
+        }
+        let rows = length(shape.first());
+        let columns = values.len() / rows;
+        let by_column =
+            (0..columns).flat_map(|column| values.iter().skip(column).step_by(columns).copied()).collect();
+        MatArray { name, rows, columns, values: by_column }
     }
 }

@@ -1,6 +1,7 @@
 //! Units in the headers of logs and tables.
 
 use crate::column_name::ColumnName;
+use crate::name_parts::Measured;
 use mapper_core::{Channel, Dimension};
 use mapper_yaml::units::{BARE_RATIO, CUBIC_FOOT_M3, Kind, Unit, UnitError, parse_with};
 use serde::Serialize;
@@ -37,7 +38,7 @@ const SPELLINGS: &[(Kind, &str, &[&str])] = &[
     (Kind::Temperature, "degF", &["degf", "°f", "f", "fahrenheit", "deg.f", "℉"]),
     (Kind::Temperature, "degR", &["degr", "°r", "rankine", "deg.r"]),
     (Kind::Speed, "rpm", &["rpm", "1/min", "min-1", "min^-1", "min⁻¹", "u/min", "upm", "rev/min", "r/min", "umin", "/min", "1/m",
-        "tr/min", "trmin", "giri/min", "t/min", "r.p.m.", "об/мин", "obr/min", "ot/min", "转/分", "转/分钟"]),
+        "tr/min", "trmin", "giri/min", "t/min", "r.p.m.", "об/мин", "obr/min", "ot/min", "omw/min", "转/分", "转/分钟"]),
     (Kind::Speed, "krpm", &["krpm", "1000rpm", "x1000rpm", "×1000rpm", "rpmx1000", "rpm/1000", "10^3rpm", "10³rpm", "1e3rpm",
         "1000/min", "k1/min", "ku/min", "kupm"]),
     (Kind::Speed, "Hz", &["hz", "1/s", "rev/s", "u/s", "rps"]),
@@ -239,6 +240,96 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
     (header.to_owned(), None)
 }
 
+/// How a heading may separate its unit from its name: text before the unit and after it.
+const FORMS: [(&str, &str); 6] = [("(", ")"), (" / ", ""), (", ", ""), (" in ", ""), ("_", ""), (" ", "")];
+
+/// Maximum number of letters of an unknown unit. Bound: `kg*m/(s*kPa)`; longer texts are remarks.
+const MAX_UNIT_LETTERS: usize = 12;
+
+/// The headings of one table, with units of no known spelling in square brackets: in `Flow slug/s` a quotient, and else what stands where
+/// many of the headings have their units, as in `Speed_rpm` and `T2_C`. An unknown unit is then named instead of being part of the name.
+pub fn with_unknown_units(headings: &[String]) -> Vec<String> {
+    let filled = headings.iter().filter(|heading| !heading.is_empty()).count();
+    let has_form = |heading: &String, (open, close): (&str, &str)| {
+        let (_, unit) = split_unit(heading);
+        let before = unit.as_deref().and_then(|unit| heading.strip_suffix(close)?.strip_suffix(unit));
+        before.is_some_and(|before| before.ends_with(open))
+    };
+    let usual = FORMS.into_iter().find(|form| {
+        let count = headings.iter().filter(|heading| has_form(heading, *form)).count();
+        form.0 != " " && count > 1 && 3 * count > filled
+    });
+    let named = |heading: &String| {
+        if heading.ends_with(']') || is_unit(heading) {
+            return heading.clone();
+        }
+        let known = split_unit(heading).1;
+        let found = FORMS.into_iter().find_map(|form| {
+            let body = heading.strip_suffix(form.1)?;
+            let at = body.rfind(form.0)?;
+            let (name, unit) = (body[..at].trim(), body[at + form.0.len()..].trim());
+            let is_found = match &known {
+                // `dwt/ms` ends in a unit of time.
+                Some(known) => {
+                    let is_time = header_unit(known).is_some_and(|unit| unit.kind == Kind::Duration);
+                    let is_quantity = ColumnName::read(name).measured().is_some();
+                    is_time && is_quantity && unit.len() > known.len() && is_unknown_quotient(unit)
+                }
+                None => is_unknown_quotient(unit) || usual == Some(form) && stands_for_unit(name, unit),
+            };
+            (is_found && name.contains(char::is_alphabetic)).then(|| format!("{name} [{unit}]"))
+        });
+        found.unwrap_or_else(|| heading.clone())
+    };
+    headings.iter().map(named).collect()
+}
+
+/// Whether a text has the form of a unit and no known words: `slug/s`, but not `P2/P1` or `in/out`.
+fn is_unknown_quotient(text: &str) -> bool {
+    let is_part = |part: &str| {
+        part.starts_with(|c: char| c.is_alphabetic() || "°%1".contains(c))
+            && part.chars().all(|c| c.is_alphanumeric() || "^·*²³°%".contains(c))
+    };
+    let Some((above, below)) = text.split_once('/') else { return false };
+    is_part(above)
+        && is_part(below)
+        && text.chars().count() <= MAX_UNIT_LETTERS
+        && !is_dimensionless(text)
+        && !(ColumnName::read(above).is_known() && ColumnName::read(below).is_known())
+}
+
+/// Whether a word is a unit where the other headings have theirs. A letter is one only of a temperature, and not of the name `T_C`.
+fn stands_for_unit(name: &str, word: &str) -> bool {
+    let letters = word.chars().count();
+    if letters == 1 {
+        let read = ColumnName::read(name);
+        let is_temperature = header_unit(word).is_some_and(|unit| unit.kind == Kind::Temperature);
+        return is_temperature && read.measured() == Some(Measured::Temperature) && read.part_count() > 1;
+    }
+    letters <= MAX_UNIT_LETTERS
+        && word.contains(char::is_alphabetic)
+        && !word.contains(|c: char| c.is_whitespace() || "()".contains(c))
+        && !is_dimensionless(word)
+        && (word.starts_with('°') || !ColumnName::read(word).is_known())
+}
+
+/// A row between blanks with the parts of each unit joined, if it then has as many cells as there are columns: `deg C`, `bar abs`.
+pub fn joined_units(row: &[String], columns: usize) -> Option<Vec<String>> {
+    let mut joined: Vec<String> = Vec::new();
+    for cell in row {
+        let whole = joined.last().map(|before| format!("{before} {cell}"));
+        match (joined.last_mut(), whole) {
+            (Some(before), Some(whole))
+                if header_unit(&whole).is_some() && !(is_unit(before) && is_unit(cell)) =>
+            {
+                *before = whole;
+            }
+            _ => joined.push(cell.clone()),
+        }
+    }
+    (row.len() > columns && joined.len() == columns).then_some(joined)
+}
+
 /// The kind of quantity that a channel measures.
 pub fn kind_of(channel: Channel) -> Kind {
     match channel.info().dimension {
@@ -362,6 +453,36 @@ mod tests {
         ] {
             assert_eq!(split_unit(header), (name.to_owned(), unit.map(str::to_owned)), "{header}");
         }
+    }
+
+    #[test]
+    fn an_unknown_unit_is_not_part_of_the_name() {
+        for (headings, expected) in [
+            (
+                vec!["Flow dwt/ms", "P2/P1", "Druck (kip/ft2)", "side in/out", "status n/a", "T2 degC"],
+                vec!["Flow [dwt/ms]", "P2/P1", "Druck [kip/ft2]", "side in/out", "status n/a", "T2 degC"],
+            ),
+            (
+                vec!["Speed_rpm", "p1_kPa", "p2_kPa", "m_kg/s", "T2_C", "T_C", "T1_tot", "m_stones"],
+                vec!["Speed_rpm", "p1_kPa", "p2_kPa", "m_kg/s", "T2 [C]", "T_C", "T1_tot", "m [stones]"],
+            ),
+            (
+                vec!["Speed, rpm", "p1, kPa", "Druck, Verdichter", "T1, degRe"],
+                vec!["Speed, rpm", "p1, kPa", "Druck, Verdichter", "T1 [degRe]"],
+            ),
+            (vec!["Speed", "T2_C", "T2 degRe", "p (upper)"], vec!["Speed", "T2_C", "T2 degRe", "p (upper)"]),
+        ] {
+            let headings: Vec<String> = headings.into_iter().map(str::to_owned).collect();
+            assert_eq!(with_unknown_units(&headings), expected);
+        }
+    }
+
+    #[test]
+    fn the_words_of_a_unit_belong_together_if_the_row_then_fits() {
+        let row = ["s", "deg", "C", "bar", "abs", "kg/s"].map(str::to_owned);
+        assert_eq!(joined_units(&row, 4).unwrap(), ["s", "deg C", "bar abs", "kg/s"]);
+        assert_eq!(joined_units(&row, 5), None);
+        assert_eq!(joined_units(&["deg C", "bar"].map(str::to_owned), 2), None);
     }
 
     #[test]

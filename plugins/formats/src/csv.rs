@@ -200,6 +200,7 @@ fn read_own_rows(
         method,
         efficiency: head.efficiency,
         gas: head.gas.clone(),
+        wheel_diameter_m: None,
         lines,
         surge: Vec::new(),
         fitted: None,

@@ -21,10 +21,10 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
 };
 
 /// Width of a field. Source: files of suppliers, and the reader of EngineToolBox (`%10s`).
-const WIDTH: usize = 10;
+pub(crate) const WIDTH: usize = 10;
 
 /// A number in a field, with as many digits as fit behind a blank.
-fn field(value: f64) -> String {
+pub(crate) fn field(value: f64) -> String {
     let exact = value.to_string();
     let exact = if exact.contains('.') { exact } else { exact + ".0" };
     let fitting = (exact.len() < WIDTH).then_some(exact);
@@ -48,8 +48,8 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     if let Some(definition) = map.efficiency {
         let _ = write!(text, "; {DEFINITION_PREFIX}{definition}");
     }
-    // The diameters of wheel and inlet are not in a map.
-    let _ = writeln!(text, "\n{}{}", field(0.0), field(0.0));
+    // Of the wheel and of its inlet, which a map does not have.
+    let _ = writeln!(text, "\n{}{}", field(map.wheel_diameter_m.unwrap_or(0.0)), field(0.0));
     let _ = writeln!(text, "   N [rpm]  m [kg/s]        PR{}", if has_eta { "       eff" } else { "" });
     for line in &map.lines {
         for point in line.points.iter().filter(|point| point.eta.is_some() || !has_eta) {

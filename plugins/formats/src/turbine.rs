@@ -1,5 +1,6 @@
 //! Maps of turbines: tables of points with exact digits, the fitted table with its intervals, and tables for simulation programs.
 
+use crate::sae::{WIDTH, field};
 use crate::simulation_table::digits;
 use mapper_core::{
     ExportError, FittedTurbine, FittedTurbineLine, FittedTurbineNode, ImportError, ImportedTurbine,
@@ -56,26 +57,22 @@ fn write_csv(map: &TurbineMap) -> Result<Vec<u8>, ExportError> {
     Ok(text.into_bytes())
 }
 
-/// SAE text; vanes add a fifth column.
+/// SAE text in the columns of the compressor's; vanes add a fifth one. A point without efficiency has `-`.
 fn write_sae(map: &TurbineMap) -> Result<Vec<u8>, ExportError> {
     let has_vanes = map.points.iter().any(|point| point.vane_position.is_some());
-    let mut text = heading(map, "#");
+    let title = heading(map, "");
+    let mut text = title.lines().next().unwrap_or_default().trim_start().to_owned();
     let vanes = if has_vanes { " VGT" } else { "" };
-    let _ = writeln!(text, "# SP(rpm/sqrt(K)) mfp(kg-sqrt(K)/s-kPa) ER Eff{vanes}");
-    let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| value.to_string());
+    let _ = writeln!(text, "\n{}{}", field(0.0), field(0.0));
+    let _ = writeln!(text, "SP(rpm/sqrt(K)) mfp(kg-sqrt(K)/s-kPa) ER Eff{vanes}");
+    let number = |value: Option<f64>| value.map_or(format!("{:>WIDTH$}", "-"), field);
     for point in &map.points {
-        let _ = write!(
-            text,
-            "{} {} {} {}",
-            point.speed_parameter_rpm_sqrt_k,
-            point.flow_parameter_kg_sqrt_k_s_kpa,
-            point.expansion_ratio,
-            number(point.efficiency)
-        );
-        let _ = match has_vanes {
-            true => writeln!(text, " {}", number(point.vane_position)),
-            false => writeln!(text),
-        };
+        let numbers =
+            [point.speed_parameter_rpm_sqrt_k, point.flow_parameter_kg_sqrt_k_s_kpa, point.expansion_ratio];
+        text.extend(numbers.map(field));
+        text += &number(point.efficiency);
+        text.extend(has_vanes.then(|| number(point.vane_position)));
+        text.push('\n');
     }
     Ok(text.into_bytes())
 }

@@ -22,6 +22,7 @@ fn empty() -> CompressorMap {
         method: Method::Steady,
         efficiency: None,
         gas: None,
+        wheel_diameter_m: None,
         lines: vec![],
         surge: Vec::new(),
         fitted: None,
@@ -337,4 +338,13 @@ fn extrapolated_nodes_are_not_read_as_points() {
         extrapolated > 0 && read.remarks.contains(&ImportRemark::ExtrapolatedNodes { count: extrapolated })
     );
     assert_eq!(points(&read.map).len(), nodes().count() - extrapolated);
+}
+
+/// The diameters stand below the title in fields of ten; that of the inlet is not known.
+#[test]
+fn sae_text_has_the_diameter_of_the_wheel() {
+    let map = CompressorMap { wheel_diameter_m: Some(0.052), ..support::turbo_a() };
+    let text = FORMATS.find("sae").unwrap().write(&map).unwrap();
+    let text = String::from_utf8(text).unwrap();
+    assert_eq!(text.lines().nth(1), Some("     0.052       0.0"));
 }

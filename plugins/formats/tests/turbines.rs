@@ -129,7 +129,31 @@ fn what_is_written_is_read_to_the_digit() {
             // Formats of the fit alone refuse a map without one.
             let Ok(bytes) = format.write_turbine(&map) else { continue };
             let back = format.read_turbine(&bytes, None).unwrap_or_else(|error| panic!("{name}: {error}"));
-            assert_eq!(back.map, map, "{name}");
+            if name == "sae" {
+                // Ten characters begin with a blank: seven digits at the least.
+                let near = |a: f64, b: f64| (a - b).abs() <= 1e-7 * a.abs().max(1.0);
+                for (found, written) in back.map.points.iter().zip(&map.points) {
+                    assert!(near(
+                        found.speed_parameter_rpm_sqrt_k / 1e3,
+                        written.speed_parameter_rpm_sqrt_k / 1e3
+                    ));
+                    assert!(near(
+                        found.flow_parameter_kg_sqrt_k_s_kpa,
+                        written.flow_parameter_kg_sqrt_k_s_kpa
+                    ));
+                    assert!(near(found.expansion_ratio, written.expansion_ratio));
+                    assert!(near(found.efficiency.unwrap_or(0.0), written.efficiency.unwrap_or(0.0)));
+                    assert!(near(found.vane_position.unwrap_or(0.0), written.vane_position.unwrap_or(0.0)));
+                }
+                assert_eq!(back.map.points.len(), map.points.len());
+                let text = String::from_utf8(bytes.clone()).unwrap();
+                let rows = text.lines().skip(3);
+                let width = if vane.is_some() { 50 } else { 40 };
+                assert!(rows.clone().count() == 3 && rows.clone().all(|row| row.len() == width), "{text}");
+                assert!(rows.clone().all(|row| (0..width).step_by(10).all(|at| row.as_bytes()[at] == b' ')));
+            } else {
+                assert_eq!(back.map, map, "{name}");
+            }
             assert!(matches!(format.read(&bytes, None), Err(ImportError::Turbine { .. })), "{name}");
             count += 1;
         }

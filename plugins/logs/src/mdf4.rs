@@ -1,15 +1,16 @@
 //! ASAM MDF, version 4: the format of measuring systems on engine test beds.
 
 use crate::mdf::{MdfSource, check_channel_count, column, forward_rows, wanted_channels};
-use falcon_mdf::{Channel, ChannelGroup, Conversion, Mf4File, OpenOptions, Signal};
+use falcon_mdf::{Channel, ChannelGroup, Conversion, Mf4File, Mf4Writer, OpenOptions, Signal};
 use mapper_recording::Kind;
 use mapper_recording::logs::limits::{MAX_BLOCK_BYTES, max_unpacked_bytes};
 use mapper_recording::logs::{
-    Group, Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink,
+    Group, Layout, Log, LogError, LogFile, LogFinding, LogFormat, LogOptions, RowSink, SampleTable,
 };
 use std::collections::BTreeSet;
+use std::io;
 
-pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open, write: None };
+pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open, write: Some(("mf4", write)) };
 
 const NAME: &str = "MDF4";
 
@@ -21,6 +22,23 @@ const VALUE_BYTES: u64 = 8;
 
 fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"MDF     ") || head.starts_with(b"UnFinMF ")
+}
+
+/// One group; a channel without a sample at a time is invalid there. Time 0 is that of the table.
+fn write(table: &SampleTable) -> io::Result<Vec<u8>> {
+    let write = || -> Result<Vec<u8>, falcon_mdf::error::Mf4Error> {
+        let mut writer = Mf4Writer::with_start_time_ns(0);
+        let group = writer.add_group(&table.times_s)?;
+        for column in &table.columns {
+            let valid: Vec<bool> = column.values.iter().map(|value| value.is_finite()).collect();
+            let some = valid.contains(&false);
+            group.add_channel_with_validity(&column.name, &column.unit, &column.values, some.then_some(&valid))?;
+        }
+        let mut bytes = Vec::new();
+        writer.write(&mut bytes)?;
+        Ok(bytes)
+    };
+    write().map_err(io::Error::other)
 }
 
 struct Mdf4 {

@@ -2,8 +2,8 @@
 
 use mapper_recording::logs::{LogFinding, LogOptions};
 use mapper_table::{
-    DateOrder, bare_unit, header_unit, is_missing, is_units_row, is_units_row_of_names, number_with_unit,
-    parse_instant, read_number, split_unit, typical_length,
+    DateOrder, bare_unit, header_unit, is_missing, is_units_row, is_units_row_of_names, joined_units,
+    number_with_unit, parse_instant, read_number, split_unit, typical_length, with_unknown_units,
 };
 use std::collections::BTreeMap;
 
@@ -79,14 +79,15 @@ pub(crate) fn analyse_head(
         Some(name) => name.clone(),
         None => one_line(cell(names_row, column)),
     };
-    let names: Vec<String> = (0..width).map(|column| split_unit(&header_of(column)).0).collect();
+    let headers: Vec<String> = (0..width).map(header_of).collect();
+    let stated = if units_row.is_none() { with_unknown_units(&headers) } else { headers.clone() };
+    let names: Vec<String> = stated.iter().map(|header| split_unit(header).0).collect();
     let mut columns: Vec<HeadColumn> = Vec::new();
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     let mut repeated = 0;
-    for column in 0..width {
-        let header = header_of(column);
+    for (column, (header, stated)) in headers.into_iter().zip(&stated).enumerate() {
         let own_unit = bare_unit(cell(units_row, column));
-        let (mut name, mut unit) = split_unit(&header);
+        let (mut name, mut unit) = split_unit(stated);
         if units_row.is_some() {
             // `T2 (upper)` is a name if the units have their own row.
             (name, unit) =
@@ -241,6 +242,9 @@ fn one_line(text: &str) -> String {
 fn without_comment_signs(rows: &[Vec<String>], data_row: usize, length: usize) -> Vec<Vec<String>> {
     let mut rows = rows.to_vec();
     for row in rows.iter_mut().take(data_row) {
+        if let Some(joined) = joined_units(row, length) {
+            *row = joined;
+        }
         let Some(first) = row.first() else { continue };
         let bare = first.trim_start_matches(['#', '%', '/']).trim_start().to_owned();
         if bare.len() == first.len() || header_unit(first).is_some() {

@@ -76,12 +76,13 @@ fn proposed(log: &Path, name: &str) -> PathBuf {
 fn every_log_format_gives_identical_points() {
     let run = Run::new();
     // By one process: its libraries take longer to load than to write.
-    let ([mdf, mdf_3, mcap, csv, mat, parquet, arrow, tdms, counted, dated, xlsx], _) = run.logs([
+    let ([mdf, mdf_3, mcap, csv, mat, hdf5, parquet, arrow, tdms, counted, dated, xlsx], _) = run.logs([
         ("mdf4", "log.mf4"),
         ("mdf3", "log.mdf"),
         ("mcap", "log.mcap"),
         ("csv", "log.csv"),
         ("mat", "log.mat"),
+        ("mat73", "log_73.mat"),
         ("parquet", "log.parquet"),
         ("arrow", "log.arrow"),
         ("tdms", "log.tdms"),
@@ -103,9 +104,12 @@ fn every_log_format_gives_identical_points() {
         assert_eq!(points(&log), expected, "{}", log.display());
     }
     // Names of variables have no place for the unit of the valve, which is not proposed then; no number depends on it.
-    for (found, expected) in points(&mat).as_array().unwrap().iter().zip(expected.as_array().unwrap()) {
-        for key in ["speed_rpm", "flow_kg_s", "pressure_ratio", "eta", "h_w_m2k"] {
-            assert_eq!(found[key], expected[key], "{key}");
+    for mat in [mat, hdf5] {
+        let found = points(&mat);
+        for (found, expected) in found.as_array().unwrap().iter().zip(expected.as_array().unwrap()) {
+            for key in ["speed_rpm", "flow_kg_s", "pressure_ratio", "eta", "h_w_m2k"] {
+                assert_eq!(found[key], expected[key], "{key}");
+            }
         }
     }
     // Its library would read what lies behind a date at the wrong places.
@@ -299,4 +303,33 @@ fn a_converted_recording_gives_the_same_points() {
     convert(&table, 1);
     assert_eq!(std::fs::read(&table).unwrap(), before);
     convert(&run.file("converted.xyz"), 3);
+}
+
+/// MDF 4 as asammdf reads it: the numbers of the table, to the bit, with their units; and no sample where the channel has none.
+#[test]
+#[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
+fn a_converted_recording_is_read_by_asammdf() {
+    let run = Run::new();
+    let (mdf, table) = (run.file("converted.mf4"), run.file("converted.csv"));
+    for out in [&mdf, &table] {
+        mapper(["log".as_ref(), "convert".as_ref(), run.recording.as_os_str(), out.as_os_str()]).exits(0);
+    }
+    let theirs = python("read_mdf.py", [&mdf]);
+    let text = std::fs::read_to_string(&table).unwrap();
+    let mut rows = text.lines();
+    let headings: Vec<&str> = rows.next().unwrap().split(',').collect();
+    let rows: Vec<Vec<Option<f64>>> =
+        rows.map(|row| row.split(',').map(|cell| cell.parse().ok()).collect()).collect();
+    assert!(headings.len() > 12 && rows.len() > 1000);
+    for (column, heading) in headings.iter().enumerate().skip(1) {
+        let (name, unit) = heading.split_once(" [").unwrap_or((heading, ""));
+        let channel = &theirs[name];
+        assert_eq!(channel["unit"].as_str().unwrap(), unit.trim_end_matches(']'), "{heading}");
+        let samples = rows.iter().filter_map(|row| Some((row[0]?, row[column]?)));
+        let (times, values): (Vec<f64>, Vec<f64>) = samples.unzip();
+        let numbers = |key: &str| -> Vec<f64> {
+            channel[key].as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
+        };
+        assert!(numbers("t_s") == times && numbers("values") == values, "{heading}");
+    }
 }

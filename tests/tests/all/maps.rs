@@ -357,3 +357,30 @@ fn content_is_the_same_however_it_is_packed() {
         assert_eq!(wide["columns"], expected["columns"], "{name}");
     }
 }
+
+/// The lines of a digitiser: their folder, and the files themselves, are the same map of both lines.
+#[test]
+fn several_files_are_one_map_as_their_folder_is() {
+    let folder = scratch();
+    let files = ["45000.csv", "75000.csv"].map(|name| folder.path().join(name));
+    std::fs::write(&files[0], "flow [lb/min],PR\n5.9,1.267\n9.2,1.244\n12.4,1.134\n").unwrap();
+    std::fs::write(&files[1], "flow [lb/min],PR\n9.5,1.742\n14.9,1.677\n20.4,1.371\n").unwrap();
+    let option = ["--reference", "SAE", "--json"].map(OsStr::new);
+    let inspect = |files: &[&Path]| {
+        let files = files.iter().map(|file| file.as_os_str());
+        let all = ["map", "inspect"].map(OsStr::new).into_iter().chain(files).chain(option);
+        mapper(all).exits(0).json()
+    };
+    let of_files = inspect(&[&files[1], &files[0]]);
+    assert_eq!(of_files, inspect(&[folder.path()]));
+    let speeds: Vec<f64> =
+        lines(&of_files).iter().map(|line| line["speed_corrected_rpm"].as_f64().unwrap()).collect();
+    assert_eq!(speeds, [45e3, 75e3]);
+    let out = folder.path().join("map.json");
+    let [first, second] = files.each_ref().map(|file| file.as_os_str());
+    run(["convert".as_ref(), first, second, out.as_os_str(), option[0], option[1]]).exits(0);
+    let map: Value = serde_json::from_slice(&std::fs::read(out).unwrap()).unwrap();
+    assert_eq!(lines(&map).iter().map(|line| line["points"].as_array().unwrap().len()).sum::<usize>(), 6);
+    run(["inspect".as_ref(), first, folder.path().join("none.csv").as_os_str(), option[0], option[1]])
+        .exits(1);
+}

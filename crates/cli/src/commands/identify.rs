@@ -3,7 +3,7 @@
 use crate::command_line::RecordingReading;
 use crate::environment::registry;
 use crate::output::failure::Failure;
-use crate::output::standard_output;
+use crate::output::{output_options, standard_output};
 use crate::terminal::{DetailLevel, identified_text, results_text};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
@@ -32,6 +32,11 @@ pub struct Identify {
     pub json: bool,
 }
 
+/// Size of a recording above which the screen says that it is read, bytes. Bound: reading takes more than a second.
+const MIN_SHOWN_BYTES: u64 = 50_000_000;
+/// Number of steps above which it says that they are identified. Bound: the same.
+const MIN_SHOWN_STEPS: usize = 100;
+
 /// The command that shows all details.
 const FULL_COMMAND: &str = "the same command with `--full`";
 
@@ -39,7 +44,13 @@ impl Identify {
     pub fn run(&self) -> Result<(), Failure> {
         let (map, given) = self.reading.read()?;
         let registry = registry();
-        let read = |path: &PathBuf| Recorded::read_run(&registry, path, &map, given.as_ref());
+        let progress = output_options::progress();
+        let read = |path: &PathBuf| {
+            if std::fs::metadata(path).is_ok_and(|file| file.len() > MIN_SHOWN_BYTES) {
+                progress.begin(&format!("reading {}", path.display()));
+            }
+            Recorded::read_run(&registry, path, &map, given.as_ref())
+        };
         let runs = self.recordings.iter().map(read).collect::<Result<Vec<_>, _>>()?;
         let recorded: Vec<Recorded> = runs.into_iter().flatten().collect();
         let path = recorded.first().map(|first| first.path.clone());
@@ -49,14 +60,20 @@ impl Identify {
         let display = campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
         let method = self.method.map(Method::from);
         let session = Session::new(&registry);
+        let steps: usize = recorded.iter().map(|one| one.read.recording.steps.len()).sum();
+        if steps > MIN_SHOWN_STEPS {
+            progress.begin(&format!("identifying {steps} steps"));
+        }
         if let Some(directory) = &self.out {
             let results = session.identify_into(recorded, &map, method, directory)?;
+            progress.clear();
             return match self.json {
                 true => standard_output::print_json(&results),
                 false => standard_output::show(&results_text(&display, &results, FULL_COMMAND, self.shown)),
             };
         }
         let identified = session.identify(recorded, &map, method)?;
+        progress.clear();
         identified.has_points(&warnings)?;
         match self.json {
             true => {

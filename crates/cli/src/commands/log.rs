@@ -69,7 +69,7 @@ impl Inspect {
 pub struct Convert {
     /// Log of a test stand, recording or run
     pub log: PathBuf,
-    /// New file; its extension gives the format: csv, mcap, and parquet or arrow if the program was built with them
+    /// New file; its extension gives the format: csv, mf4, mcap, and parquet or arrow if the program was built with them
     pub out: PathBuf,
     /// Channel map of the log; `mapper log inspect --write-channels` writes one
     #[arg(long, value_name = "FILE")]

@@ -8,7 +8,7 @@ use clap::Args;
 use mapper_core::{EfficiencyDefinition, MapDescription};
 use mapper_maps::{MapFitOptions, MapScale};
 use mapper_session::{Recorded, Session};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Fit, convert and compare compressor maps
 #[derive(Debug, Args)]
@@ -33,6 +33,10 @@ impl Map {
     pub fn run(&self) -> Result<(), Failure> {
         self.command.run()
     }
+}
+
+fn paths(files: &[PathBuf]) -> Vec<&Path> {
+    files.iter().map(PathBuf::as_path).collect()
 }
 
 /// Statements about a second map
@@ -88,8 +92,9 @@ impl Compare {
 /// Write a map in another format, at another reference state
 #[derive(Debug, Args)]
 pub struct Convert {
-    /// Map, in any layout that `mapper map inspect` understands
-    pub map: PathBuf,
+    /// Map, in any layout that `mapper map inspect` understands; several files, one for each speed line or contour, are one map
+    #[arg(required = true)]
+    pub map: Vec<PathBuf>,
     /// New file; its extension gives the format unless `--to` does
     pub out: PathBuf,
     /// Format of the new file
@@ -117,7 +122,8 @@ impl Convert {
         let efficiencies = (self.efficiency, self.to_efficiency);
         let description = self.reading.description()?;
         let registry = registry();
-        let work = registry.convert_map_file(&self.map, &description, out, to_reference, efficiencies)?;
+        let work =
+            registry.convert_map_file(&paths(&self.map), &description, out, to_reference, efficiencies)?;
         standard_output::print_map_work(&work, self.output.json)
     }
 }
@@ -196,8 +202,9 @@ impl Merge {
 /// Fit all speed lines together and print the error at each line when it is left out
 #[derive(Debug, Args)]
 pub struct Fit {
-    /// Map in any layout of `mapper map inspect`, or run directory
-    pub map: PathBuf,
+    /// Map in any layout of `mapper map inspect`, also in several files, or run directory
+    #[arg(required = true)]
+    pub map: Vec<PathBuf>,
     #[command(flatten)]
     pub reading: MapReading,
     /// Corrected speeds of additional lines, rpm, instead of two below and one above the measured ones
@@ -221,7 +228,7 @@ impl Fit {
             leave_one_out: !self.no_leave_out,
         };
         let description = self.reading.description()?;
-        let work = registry().fit_map_file(&self.map, &description, &options, self.target.map())?;
+        let work = registry().fit_map_file(&paths(&self.map), &description, &options, self.target.map())?;
         standard_output::print_map_work(&work, self.target.output.json)
     }
 }
@@ -272,8 +279,9 @@ impl Fmu {
 /// Show how a map file is read: columns, units, reference state, speed lines, and assumptions
 #[derive(Debug, Args)]
 pub struct Inspect {
-    /// Map file
-    pub map: PathBuf,
+    /// Map file; several, one for each speed line (`45000.csv`) or contour (`eta_0.72.csv`), are one map
+    #[arg(required = true)]
+    pub map: Vec<PathBuf>,
     #[command(flatten)]
     pub reading: MapReading,
     /// Write a map description, which later commands and campaigns accept, to this new file
@@ -286,7 +294,8 @@ pub struct Inspect {
 impl Inspect {
     pub fn run(&self) -> Result<(), Failure> {
         let description = self.write_description.as_deref().map(|file| (file, self.output.existing()));
-        let work = registry().inspect_map_file(&self.map, &self.reading.description()?, description)?;
+        let work =
+            registry().inspect_map_file(&paths(&self.map), &self.reading.description()?, description)?;
         standard_output::print_map_work(&work, self.output.json)
     }
 }

@@ -62,6 +62,9 @@ pub struct CompressorMap {
     /// Description of the gas; corrected flows are those of dry air at equal Mach numbers. `None` if a map file does not name it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gas: Option<String>,
+    /// Diameter of the compressor wheel at its exit, m; `None` if it is not declared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wheel_diameter_m: Option<f64>,
     /// Speed lines in order of speed.
     pub lines: Vec<SpeedLine>,
     /// Measured surge-side ends, in order of speed; empty if none were measured.

@@ -23,8 +23,9 @@ use mapper_physics::operating_point::forecast::ForecastRow;
 /// The errors are computed with alpha_A, probe and heating/cooling ratio as declared: without evidence against the declaration, the method
 /// shrinks them towards it. After an isothermal zero `config` is that of [`expected_after_zero`](crate::expected_after_zero).
 pub fn expected_together(steps: &[&[ForecastRow]], config: &IdentifyConfig) -> Option<MethodResults> {
-    let condensed: Vec<StepRows> =
-        steps.iter().enumerate().filter_map(|(position, step)| condensed(position, step, config)).collect();
+    let rows_of =
+        |(position, step): (usize, &&[ForecastRow])| condensed((position, steps.len()), step, config);
+    let condensed: Vec<StepRows> = steps.iter().enumerate().filter_map(rows_of).collect();
     let start = |rows: &&[ForecastRow]| Estimate {
         eta: rows.last().map(|end| (end.efficiency, None)),
         ..Estimate::default()
@@ -89,13 +90,17 @@ fn undeclared<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
 }
 
 /// The rows to which the method would condense the samples of a recording.
-fn condensed(position: usize, step: &[ForecastRow], config: &IdentifyConfig) -> Option<StepRows> {
+fn condensed(
+    (position, steps): (usize, usize),
+    step: &[ForecastRow],
+    config: &IdentifyConfig,
+) -> Option<StepRows> {
     let first = step.partition_point(|expected| expected.t_s < start::start_after_s(config));
     let (first_s, last_s) = (step.get(first)?.t_s, step.last()?.t_s);
     let mut rows: Vec<Row> = Vec::new();
     let mut times_s: Vec<Vec<f64>> = Vec::new();
     for expected in &step[first..] {
-        let block_s = block_s_after(expected.t_s - first_s, last_s - first_s, config);
+        let block_s = block_s_after(expected.t_s - first_s, last_s - first_s, steps, config);
         if rows.last().is_none_or(|last| expected.t_s - last.t_s >= block_s - TIME_ROUNDING_S) {
             rows.push(row(expected, config));
             let count = (block_s / SAMPLE_INTERVAL_S).round().max(1.0) as usize;

@@ -14,6 +14,7 @@ pub(crate) mod thermal_model;
 pub(crate) mod uncertainty;
 
 use crate::faults::balances::efficiency::FittedEfficiencies;
+use crate::joint::fit::input_noise::Whitening;
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, Member, Problem};
 use crate::joint::step_model::parameters::{ETA, INLET, LN_INNER_CONDUCTANCE, LOGIT_INNER, bounds};
@@ -340,7 +341,8 @@ fn best_housing<'a>(
     config: &IdentifyConfig,
 ) -> Option<Fitted> {
     // A fit of one part has moved its parameters to imitate a second one, so all begin at the start.
-    let start = problem.clone();
+    let mut start = problem.clone();
+    start.members.iter_mut().for_each(|member| member.whitening = Whitening::default());
     minimise(problem, config)?;
     if !problem.model.has_balance || !judge::may_have_parts(problem) {
         return Fitted::of(problem, config);
@@ -353,6 +355,7 @@ fn best_housing<'a>(
             continue;
         }
         let mut other = fit::start::with_parts(&start, parts);
+        fit::step_noise::begin(&mut other, config)?;
         let favoured = minimise_in_stages(&mut other, config)
             .and_then(|()| Some(other.ln_evidence()? - problem.ln_evidence()?));
         // On a bound the part does not exist, and Laplace's method does not hold there.

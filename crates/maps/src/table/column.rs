@@ -6,9 +6,10 @@ use mapper_core::unit_factors::{G_PER_KG, PA_PER_KPA, PERCENT};
 use mapper_physics::gas::air::GAS_CONSTANT_J_KGK;
 use mapper_table::{
     ColumnName, Measured, Reference, Word, bare_unit, header_unit, is_dimensionless, is_reduced_unit,
-    is_units_row_of_names, split_unit, volume_flow_m3_s,
+    is_units_row_of_names, joined_units, split_unit, volume_flow_m3_s,
 };
 use mapper_yaml::units::{Kind, Unit};
+use std::borrow::Cow;
 
 /// Maximum number of letters of a heading that is kept. Bound: a line of a message.
 pub(crate) const MAX_HEADING: usize = 60;
@@ -73,6 +74,20 @@ impl Column {
                 kind: quantity.kind().name(),
                 known: quantity.unit_list(),
             }),
+        }
+    }
+
+    /// A pressure or temperature without a unit has that of the others, if all of those have the same.
+    pub(crate) fn share_unit(&mut self, others: &[Column]) {
+        let kind = self.quantity.kind();
+        let has_kind = |other: &&Column| other.has_unit() && other.quantity.kind() == kind;
+        let mut others = others.iter().filter(has_kind);
+        let Some(first) = others.next().filter(|_| matches!(kind, Kind::Pressure | Kind::Temperature)) else {
+            return;
+        };
+        if !self.has_unit() && others.all(|other| other.scale == first.scale) {
+            (self.scale, self.unit) = (first.scale, first.unit.clone());
+            self.is_gauge = first.is_gauge && self.quantity != Quantity::Ambient;
         }
     }
 
@@ -259,7 +274,7 @@ fn quantity_of_unit(unit: &str) -> Option<Quantity> {
         return Some(Quantity::Efficiency);
     }
     if is_reduced_unit(&lower) {
-        return Some(if lower.contains("kg") || lower.contains("lb") {
+        return Some(if lower.contains("kg") || lower.contains("lb") || lower.starts_with('g') {
             Quantity::ReducedFlow
         } else {
             Quantity::ReducedSpeed
@@ -285,7 +300,7 @@ fn scale(quantity: Quantity, unit: &str) -> Option<Scale> {
         }
         Quantity::ReducedFlow => {
             // `kg/s*K^0.5/kPa`, `kg-sqrt(K)/s-kPa`, `kg*sqrt(K)/(s*kPa)`: mass first, pressure last.
-            let mass = unit.split(['*', '-', ' ']).next()?;
+            let mass = unit.split(['*', '-', ' ']).next()?.trim_matches(['(', ')']);
             let mass = if mass.contains('/') { mass.to_owned() } else { format!("{mass}/s") };
             let pressure = unit.trim_end_matches([')', ' ']).rsplit(['/', '*', '-', ' ', '(']).next()?;
             let kg_s = unit_of(Kind::MassFlow, &mass)?.to_inside(1.0);
@@ -349,7 +364,8 @@ pub(crate) fn with_machine_letters(headings: &[String], bare_is_compressor: bool
 /// Headings with the units from a row of their own: `flow` and `g/s` become `flow [g/s]`. `None` if the row is not a row of units. A heading
 /// with a unit keeps it. Each unit counts by itself: an unknown one concerns its own column alone.
 pub(crate) fn merge_units_row(headings: &[String], row: &[String]) -> Option<Vec<String>> {
-    if !is_units_row_of_names(row) {
+    let row = joined_units(row, headings.len()).map_or(Cow::Borrowed(row), Cow::Owned);
+    if !is_units_row_of_names(&row) {
         return None;
     }
     let joined = headings.iter().enumerate().map(|(index, heading)| {

@@ -137,6 +137,7 @@ fn read_columns(
         }
         if point.is_of_surge_line { &mut surge } else { &mut rows }.push(row);
     }
+    check_unit_of_temperature(&measured)?;
     check_is_compressor(&measured)?;
     check_unit_of_efficiency(&layout, &rows)?;
     remarks.extend(add_surge_speeds(&rows, &mut surge));
@@ -193,6 +194,24 @@ fn no_efficiency(point: &MeasuredPoint) -> Warning {
 
 /// Maximum inlet temperature of a compressor, K. Bound: air that a stage before it has compressed to twice the pressure without a cooler.
 const MAX_INLET_K: f64 = 400.0;
+
+/// Minimum inlet temperature of a compressor, K. Bound: the coldest air on earth has 180 K; a number of degC or degF is below it.
+const MIN_INLET_K: f64 = 180.0;
+
+/// Refuses a table whose inlet is colder than any air: its temperatures have another unit.
+fn check_unit_of_temperature(measured: &[MeasuredPoint]) -> Result<(), ImportError> {
+    let is_cold: fn(&&MeasuredPoint) -> bool = |point| point.t1_k < MIN_INLET_K;
+    let count = measured.iter().filter(is_cold).count();
+    match measured.iter().find(is_cold).filter(|_| 2 * count > measured.len()) {
+        None => Ok(()),
+        Some(point) => Err(ImportError::Value {
+            line: point.line,
+            quantity: "T1 in K",
+            value: point.t1_k,
+            needed: "that of air; if the column is in degC or degF, write that into its heading",
+        }),
+    }
+}
 
 /// Refuses a table whose compressor expands or draws in exhaust gas: its columns are another machine's.
 fn check_is_compressor(measured: &[MeasuredPoint]) -> Result<(), ImportError> {

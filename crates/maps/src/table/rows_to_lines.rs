@@ -171,6 +171,7 @@ pub fn map_of_rows(
         method: Method::Imported,
         efficiency: None,
         gas: None,
+        wheel_diameter_m: None,
         lines,
         surge: Vec::new(),
         fitted: None,

@@ -25,6 +25,7 @@ pub fn map_of(rows: &[Row]) -> CompressorMap {
         method: Method::Imported,
         efficiency: None,
         gas: None,
+        wheel_diameter_m: None,
         lines,
         surge: Vec::new(),
         fitted: None,

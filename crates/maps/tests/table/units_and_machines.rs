@@ -286,3 +286,40 @@ fn a_comment_with_a_reference_state_is_no_list_of_columns() {
         assert!(text.contains("dry") || found.is_ok(), "{text}");
     }
 }
+
+#[test]
+fn no_unit_is_dropped_in_silence() {
+    for (heading, separator) in [
+        ("Speed rpm,Flow slug/s,PR,Eff %\n", ","),
+        ("Speed, rpm;Flow, slugs;PR;Eff, %\n", ";"),
+        ("Speed_rpm,Flow_stones,PR,Eff_pct\n", ","),
+        ("Speed (rpm),Flow (kip/h),PR,Eff (%)\n", ","),
+        ("# N [rpm], W [slug/s], PR, Eff [%]\n", " "),
+    ] {
+        let refused = read(&imperial(heading, separator, ""));
+        assert!(matches!(refused, Err(ImportError::Row { line: 1, .. })), "{heading}: {refused:?}");
+    }
+    // No air is as cold as 22 K.
+    let cold = read("N [rpm],m [kg/s],P1 [kPa],T1,P2 [kPa],T2\n80000,0.1,98,22,196,110\n");
+    assert!(matches!(cold, Err(ImportError::Value { line: 2, quantity: "T1 in K", .. })), "{cold:?}");
+    // A pressure and a temperature have the unit of the others.
+    let shared = read("N [rpm],m [kg/s],P1 [kPa],T1 [degC],P2,T2\n80000,0.1,98,22,196,110\n").unwrap();
+    assert_eq!((shared.measured[0].p2_pa, shared.measured[0].t2_k), (196e3, Some(383.15)));
+    for unit in ["g/s*K^0.5/kPa", "(g/s)*sqrt(K)/kPa"] {
+        let text = format!("N/sqrt(T3) [rpm/K^0.5],MFP [{unit}],ER,Eff\n2000,12,1.3,0.6\n");
+        let found = read_turbine_text(&text, &MapDescription::default()).unwrap();
+        assert_eq!(found.map.points[0].flow_parameter_kg_sqrt_k_s_kpa, 0.012, "{unit}");
+    }
+}
+
+/// Between tabs, as between other separators, a row may begin with an empty cell: the speed of the row above.
+#[test]
+fn a_row_between_tabs_may_begin_with_an_empty_cell() {
+    for separator in ["\t", ";"] {
+        let text =
+            "Speed [rpm];Flow [kg/s];PR;Eff\n60000;0.05;1.4;0.7\n;0.06;1.3;0.68\n".replace(';', separator);
+        let map = read(&text).unwrap().map;
+        let flows: Vec<f64> = map.lines[0].points.iter().map(|point| point.flow_corrected_kg_s).collect();
+        assert_eq!((map.lines.len(), flows), (1, vec![0.05, 0.06]));
+    }
+}

@@ -150,9 +150,12 @@ const UNSUPPORTED_FORMATS: [(&[u8], &str); 8] = [
         "it is Arrow, which this program was built without: `cargo build --release --locked --features parquet`, or export it as CSV, e.g. \
          with `polars.read_ipc(FILE).write_csv(NEW)`",
     ),
-    (b"\x89HDF", "it is HDF5; export it as CSV"),
+    (b"\x89HDF", "it is HDF5, which this program was built without (`--features hdf5`); export it as CSV"),
     (FAMOS, "it is imc FAMOS; save it in FAMOS as MDF 4, MATLAB or text"),
-    (b"MATLAB 7.3", "it is MATLAB data of version 7.3; save it by `save -v7`, or export it as CSV"),
+    (
+        b"MATLAB 7.3",
+        "it is MATLAB data of version 7.3, which this program was built without (`--features hdf5`); save it by `save -v7`",
+    ),
     (b"PK", "it is a zip archive but not a complete Excel workbook; unpack it, or save the workbook again"),
 ];
 

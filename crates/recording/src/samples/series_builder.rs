@@ -207,7 +207,7 @@ impl SeriesBuilder {
             let channels = vec![channel];
             ReadWarning::NotANumber { channels, count: self.non_numeric_count }.add_to(warnings);
         }
-        let (times_ns, values) = if self.times_ns.is_sorted_by(|a, b| a < b) {
+        let (times_ns, mut values) = if self.times_ns.is_sorted_by(|a, b| a < b) {
             (self.times_ns, self.values)
         } else {
             let reordered = self.times_ns.windows(2).filter(|pair| pair[1] < pair[0]).count();
@@ -219,7 +219,11 @@ impl SeriesBuilder {
             ReadWarning::OutOfOrder { channels: vec![channel], reordered, repeated }.add_to(warnings);
             samples.into_iter().unzip()
         };
-        Series { t_s: times_ns.into_iter().map(|time_ns| run_time_s(time_ns, zero_ns)).collect(), values }
+        let mut t_s: Vec<f64> = times_ns.into_iter().map(|time_ns| run_time_s(time_ns, zero_ns)).collect();
+        // What reading had reserved for further samples.
+        t_s.shrink_to_fit();
+        values.shrink_to_fit();
+        Series { t_s, values }
     }
 }
 

@@ -218,7 +218,7 @@ impl RunFolder {
 
     /// Its map.
     pub fn map(&self, registry: &Registry) -> Result<CompressorMap, SessionError> {
-        match registry.read_map_file(&self.path, &MapDescription::default())? {
+        match registry.read_map_file(&[&self.path], &MapDescription::default())? {
             MapFile::Compressor(imported) => Ok(imported.map),
             MapFile::Turbine(_) => Err(crate::MapWorkError::TwoMachines(self.path.clone()).into()),
         }

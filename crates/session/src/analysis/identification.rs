@@ -187,7 +187,8 @@ impl Identified {
         let config = &self.config;
         let map = assemble(&points, machine, config.reference, config.method)?;
         let surge = self.surge.iter().flat_map(|found| found.marks.iter().map(|scored| scored.mark));
-        Ok(CompressorMap { surge: surge.collect(), ..with_gas(map, config.air) })
+        let wheel_diameter_m = config.wheel_diameter_m;
+        Ok(CompressorMap { wheel_diameter_m, surge: surge.collect(), ..with_gas(map, config.air) })
     }
 
     /// The map of the turbine; `None` with too few points.

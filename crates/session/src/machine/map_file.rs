@@ -10,7 +10,7 @@ use mapper_core::{
 use mapper_maps::table::{read_description, set_key, text_of_lines, unpack};
 use mapper_maps::{MapFitOptions, fit_map};
 use std::io::{Error, ErrorKind, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 impl Registry {
     /// Reads a map file (also `.gz`), or the map of a run, by its extension; `user_description`: what the user states, e.g. the reference state.
@@ -28,8 +28,17 @@ impl Registry {
         path: &Path,
         user_description: impl Into<MapDescription>,
     ) -> Result<ImportedMap, SessionError> {
-        let (format, bytes) = self.map_bytes(path)?;
-        format.read(&bytes, user_description).map_err(|source| SessionError::Import(path.to_owned(), source))
+        self.inspect_map_of(&[path], user_description)
+    }
+
+    /// The same of a map in several files: one for each speed line or line of equal efficiency.
+    pub(crate) fn inspect_map_of(
+        &self,
+        files: &[&Path],
+        user_description: impl Into<MapDescription>,
+    ) -> Result<ImportedMap, SessionError> {
+        let (format, bytes) = self.map_bytes(files)?;
+        format.read(&bytes, user_description).map_err(|source| SessionError::Import(name_of(files), source))
     }
 
     /// Reads the map of a turbine.
@@ -38,13 +47,34 @@ impl Registry {
         path: &Path,
         user_description: impl Into<MapDescription>,
     ) -> Result<ImportedTurbine, SessionError> {
-        let (format, bytes) = self.map_bytes(path)?;
-        format
-            .read_turbine(&bytes, user_description)
-            .map_err(|source| SessionError::Import(path.to_owned(), source))
+        self.inspect_turbine_of(&[path], user_description)
     }
 
-    fn map_bytes(&self, path: &Path) -> Result<(&'static MapFormat, Vec<u8>), SessionError> {
+    pub(crate) fn inspect_turbine_of(
+        &self,
+        files: &[&Path],
+        user_description: impl Into<MapDescription>,
+    ) -> Result<ImportedTurbine, SessionError> {
+        let (format, bytes) = self.map_bytes(files)?;
+        let failed = |source| SessionError::Import(name_of(files), source);
+        format.read_turbine(&bytes, user_description).map_err(failed)
+    }
+
+    fn map_bytes(&self, files: &[&Path]) -> Result<(&'static MapFormat, Vec<u8>), SessionError> {
+        let of_lines = |files: Result<Vec<(String, Vec<u8>)>, Error>, path: PathBuf| {
+            let files = files.map_err(SessionError::file("read", &path))?;
+            let text = text_of_lines(&files).map_err(|source| SessionError::Import(path, source))?;
+            Ok::<_, SessionError>(text.into_bytes())
+        };
+        let csv = self.formats.find("csv");
+        let path = match (files, csv) {
+            ([path], _) => *path,
+            (_, Some(csv)) => {
+                let lines = files.iter().map(|file| line_file(file)).collect();
+                return Ok((csv, of_lines(lines, name_of(files))?));
+            }
+            (_, None) => return Err(self.unknown_extension(&name_of(files), "")),
+        };
         if path == Path::new(STANDARD_INPUT) {
             let bytes = read_map_bytes(std::io::stdin().lock(), path)?;
             let format = self.formats.find(format_of_content(&bytes));
@@ -52,11 +82,10 @@ impl Registry {
         }
         let in_run = path.join("map.json");
         if path.is_dir() && !in_run.exists() {
-            let files = line_files(path).map_err(SessionError::file("read", path))?;
-            if let Some(format) = self.formats.find("csv").filter(|_| !files.is_empty()) {
-                let text =
-                    text_of_lines(&files).map_err(|source| SessionError::Import(path.to_owned(), source))?;
-                return Ok((format, text.into_bytes()));
+            let lines = line_files(path);
+            let has_lines = lines.as_ref().map_or(true, |lines| !lines.is_empty());
+            if let Some(csv) = csv.filter(|_| has_lines) {
+                return Ok((csv, of_lines(lines, path.to_owned())?));
             }
         }
         let path = if path.is_dir() { in_run.as_path() } else { path };
@@ -158,13 +187,24 @@ fn line_files(directory: &Path) -> Result<Vec<(String, Vec<u8>)>, Error> {
         let path = entry?.path();
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         if path.is_file() && LINE_EXTENSIONS.contains(&extension.as_str()) {
-            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let mut bytes = Vec::new();
-            mapper_yaml::open_file(&path)?.take(MAP_FILE_SIZE_LIMIT as u64).read_to_end(&mut bytes)?;
-            files.push((name, bytes));
+            files.push(line_file(&path)?);
         }
     }
     Ok(files)
+}
+
+/// Name without extension and content of a file of one line.
+fn line_file(path: &Path) -> Result<(String, Vec<u8>), Error> {
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let mut bytes = Vec::new();
+    mapper_yaml::open_file(path)?.take(MAP_FILE_SIZE_LIMIT as u64).read_to_end(&mut bytes)?;
+    Ok((name, bytes))
+}
+
+/// The files of a map in messages.
+pub(crate) fn name_of(files: &[&Path]) -> PathBuf {
+    let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+    PathBuf::from(names.join(", "))
 }
 
 /// What the user states about a map file: a description, and statements that count before it.

@@ -1,7 +1,7 @@
 //! Commands on map files, of compressors and turbines: the result as text for people and as JSON for programs.
 
 use crate::errors::MapWorkError;
-use crate::machine::map_file::write_map_fitted_if_needed;
+use crate::machine::map_file::{name_of, write_map_fitted_if_needed};
 use crate::recording::files::Existing;
 use crate::{Registry, SessionError, write_file, write_map};
 use mapper_core::{
@@ -97,13 +97,13 @@ impl Registry {
     /// Reads the map of a compressor or of a turbine.
     pub fn read_map_file(
         &self,
-        path: &Path,
+        files: &[&Path],
         user_description: &MapDescription,
     ) -> Result<MapFile, SessionError> {
-        match self.inspect_map(path, user_description) {
+        match self.inspect_map_of(files, user_description) {
             Ok(imported) => Ok(MapFile::Compressor(imported)),
             Err(SessionError::Import(_, ImportError::Turbine { .. })) => {
-                self.inspect_turbine(path, user_description).map(MapFile::Turbine)
+                self.inspect_turbine_of(files, user_description).map(MapFile::Turbine)
             }
             Err(error) => Err(error),
         }
@@ -112,12 +112,12 @@ impl Registry {
     /// Shows how a map file is read. `description` is a new file for the map description.
     pub fn inspect_map_file(
         &self,
-        path: &Path,
+        files: &[&Path],
         user_description: &MapDescription,
         description: Option<(&Path, Existing)>,
     ) -> Result<MapWork, SessionError> {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let (described, document, json) = match self.read_map_file(path, user_description)? {
+        let name = files.first().and_then(|path| path.file_name()).unwrap_or_default().to_string_lossy();
+        let (described, document, json) = match self.read_map_file(files, user_description)? {
             MapFile::Compressor(imported) => {
                 let lines = imported.map.lines.iter().map(|line| {
                     let is_unusable = |point: &&MapPoint| point.identified.verdict == Verdict::Unusable;
@@ -164,14 +164,15 @@ impl Registry {
     /// Fits a map, and writes it to `out`.
     pub fn fit_map_file(
         &self,
-        path: &Path,
+        files: &[&Path],
         user_description: &MapDescription,
         options: &MapFitOptions,
         out: Option<MapOut<'_>>,
     ) -> Result<MapWork, SessionError> {
+        let path = &name_of(files);
         let format = out.map(|out| Ok::<_, SessionError>((out, out.format(self)?))).transpose()?;
         let file = out.map(|out| out.path);
-        let (mut document, json, remarks) = match self.read_map_file(path, user_description)? {
+        let (mut document, json, remarks) = match self.read_map_file(files, user_description)? {
             MapFile::Compressor(imported) => {
                 let map = fit_map(imported.map, options)
                     .map_err(|source| MapWorkError::NotFitted(path.to_owned(), source))?;
@@ -203,14 +204,15 @@ impl Registry {
     /// Writes a map in another format, at another reference state, with efficiencies of another definition.
     pub fn convert_map_file(
         &self,
-        path: &Path,
+        files: &[&Path],
         user_description: &MapDescription,
         out: MapOut<'_>,
         to_reference: Option<ReferenceState>,
         efficiencies: (Option<EfficiencyDefinition>, Option<EfficiencyDefinition>),
     ) -> Result<MapWork, SessionError> {
+        let path = &name_of(files);
         let format = out.format(self)?;
-        match self.read_map_file(path, user_description)? {
+        match self.read_map_file(files, user_description)? {
             MapFile::Compressor(imported) => {
                 let mut map = imported.map;
                 if let Some(reference) = to_reference {
@@ -289,7 +291,7 @@ impl Registry {
         picture: Option<(&Path, Existing)>,
     ) -> Result<MapWork, SessionError> {
         let paths = [first.0, second.0];
-        let maps = (self.read_map_file(first.0, first.1)?, self.read_map_file(second.0, second.1)?);
+        let maps = (self.read_map_file(&[first.0], first.1)?, self.read_map_file(&[second.0], second.1)?);
         let (document, json, remarks) = match maps {
             (MapFile::Compressor(a), MapFile::Compressor(b)) => {
                 let comparison = compare(&a.map, &b.map).map_err(MapWorkError::from)?;

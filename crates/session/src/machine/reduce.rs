@@ -147,6 +147,7 @@ impl Registry {
         let map = assemble(&points, &name, config.reference, config.method)
             .map_err(|source| MapWorkError::NotAssembled(path.to_owned(), source))?;
         let mut map = with_gas(map, config.air);
+        map.wheel_diameter_m = config.wheel_diameter_m;
         let ends = mark_line_ends(&mut map, |step| measured.get(step)?.end);
         let mut document = reduced_map(&map, &ends, &budgets, &remarks);
         let json = json!({

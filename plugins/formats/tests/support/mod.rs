@@ -54,6 +54,7 @@ pub fn turbo_a() -> CompressorMap {
         method: Method::Dynamic,
         efficiency: Some(EfficiencyDefinition::ConstantGamma(1.395)),
         gas: Some("air, 8.2 g of water per kg of dry gas".to_owned()),
+        wheel_diameter_m: None,
         lines,
         surge: Vec::new(),
         fitted: None,

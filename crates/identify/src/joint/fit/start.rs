@@ -1,7 +1,7 @@
 //! Prepares a recording for the fit, and estimates noise and spreads from the fit.
 
 use crate::faults::end_readings::ANY_ROUGHNESS;
-use crate::joint::fit::input_noise::InputNoise;
+use crate::joint::fit::input_noise::{InputNoise, Whitening};
 use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::fit::{refinements, step_noise};
 use crate::joint::step_model::gas_path::{Setting, reynolds};
@@ -304,11 +304,9 @@ pub(crate) fn problem<'a>(
         active[SURFACE + k] = true;
     }
 
-    let members = steps
-        .iter()
-        .map(|step| member(step, alone.get(step.position), (&scale, mean_eta), &model, config))
-        .collect::<Option<Vec<_>>>()?;
-    Some(Problem {
+    let members =
+        steps.iter().map(|step| member(step, alone.get(step.position), (&scale, mean_eta), &model)).collect();
+    let mut problem = Problem {
         left_over: [0.0; SHARED],
         model,
         members,
@@ -320,7 +318,9 @@ pub(crate) fn problem<'a>(
         is_exact: config.declared.is_empty(),
         inlet_sought: choice.inlet_h == Choice::Fitted,
         inlet: None,
-    })
+    };
+    step_noise::begin(&mut problem, config)?;
+    Some(problem)
 }
 
 /// The problem of a housing of more parts, which the problem of fewer starts.
@@ -344,8 +344,7 @@ fn member<'a>(
     found: Option<&Estimate>,
     (scale, mean_eta): (&SurfaceScale, f64),
     model: &Model,
-    config: &IdentifyConfig,
-) -> Option<Member<'a>> {
+) -> Member<'a> {
     let free = Prior { mean: 0.0, sigma: f64::INFINITY };
     let end_terms = scale.terms(step.end.place);
     let terms = step
@@ -375,9 +374,9 @@ fn member<'a>(
     if model.has_balance {
         measured_k.extend(step.rows.iter().map(|row| row.tc_read_k));
     }
-    Some(Member {
+    Member {
         history: StepHistory { step, terms, by_flow },
-        whitening: step_noise::start(step, measured_k.len(), config)?,
+        whitening: Whitening::default(),
         measured_k,
         coupling: std::array::from_fn(|i| {
             i.checked_sub(SURFACE).and_then(|k| end_terms.get(k)).copied().unwrap_or(0.0)
@@ -386,7 +385,7 @@ fn member<'a>(
         priors: own,
         contributes: true,
         excluded: false,
-    })
+    }
 }
 
 /// Estimates the noise of each step and the spreads of the points about surface and law from the fit; `None` if the equations are singular.

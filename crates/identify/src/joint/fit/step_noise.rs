@@ -35,6 +35,9 @@ const SMOOTHED_SLOPE_RATIO: f64 = 0.01;
 /// Time over which that error keeps its sign, s. Bound: between the two functions' times.
 const SMOOTHED_SLOPE_S: f64 = 5.0;
 
+/// Steps whose covariances are found before the old ones are dropped. Bound: enough for the cores of a computer, few of a long recording.
+const AT_ONCE: usize = 16;
+
 /// The smoothed channels in the order of their places, with the channel of their noise.
 const INPUTS: [(usize, SmoothedInput, Channel); SMOOTHED_COUNT] = [
     (T1, SmoothedInput::T1, Channel::T1),
@@ -53,42 +56,44 @@ const INPUTS: [(usize, SmoothedInput, Channel); SMOOTHED_COUNT] = [
 pub(crate) fn set(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
     let predictions = problem.predictions(&problem.shared, &problem.locals(), None);
     let parts = problem.parts(&predictions);
-    let problem_now = &*problem;
-    let places: Vec<usize> = (0..problem_now.members.len()).collect();
-    let found = parallel::map(&places, |i| {
-        let member = &problem_now.members[*i];
-        let readings_k = &predictions[*i].readings_k;
-        let residual: Vec<f64> = member.measured_k.iter().zip(readings_k).map(|(a, b)| a - b).collect();
-        let linearised = |shared: &SharedVector, wanted: Wanted, known: Option<&Linearised<'_>>| {
-            let (history, at) = (&member.history, (shared, &member.local));
-            let paths = (known.is_none(), known);
-            problem_now.model.linearised(history, at, Some(wanted), parts[*i].as_ref(), paths).0
-        };
-        let here = linearised(&problem_now.shared, Wanted::Law, None);
-        let (covariance, inputs) = covariance(problem_now, member, &here, &residual, config);
-        let whitening = Whitening::new(covariance)?;
-        let noise = match member.history.step.smoothing.as_ref() {
-            Some(smoothing) if member.contributes && !inputs.is_empty() => {
-                let own = OwnPart::of(problem_now, member, &here, &whitening)?;
-                Some(input_noise(
-                    problem_now,
-                    &inputs,
-                    (&member.history, smoothing),
-                    (&whitening, &own),
-                    &|moved| linearised(moved, Wanted::Readings, Some(&here)),
-                )?)
-            }
-            _ => None,
-        };
-        Some((whitening, noise))
-    });
     let mut sum = InputNoise { at: problem.shared, ..InputNoise::none() };
-    for (member, found) in problem.members.iter_mut().zip(found) {
-        let (whitening, noise) = found?;
-        member.whitening = whitening;
-        if let Some((slopes, square)) = noise {
-            sum.slope.iter_mut().zip(slopes).for_each(|(sum, own)| *sum += own);
-            sum.square += square;
+    let places: Vec<usize> = (0..problem.members.len()).collect();
+    for places in places.chunks(AT_ONCE) {
+        let problem_now = &*problem;
+        let found = parallel::map(places, |i| {
+            let member = &problem_now.members[*i];
+            let readings_k = &predictions[*i].readings_k;
+            let residual: Vec<f64> = member.measured_k.iter().zip(readings_k).map(|(a, b)| a - b).collect();
+            let linearised = |shared: &SharedVector, wanted: Wanted, known: Option<&Linearised<'_>>| {
+                let (history, at) = (&member.history, (shared, &member.local));
+                let paths = (known.is_none(), known);
+                problem_now.model.linearised(history, at, Some(wanted), parts[*i].as_ref(), paths).0
+            };
+            let here = linearised(&problem_now.shared, Wanted::Law, None);
+            let (covariance, inputs) = covariance(problem_now, member, &here, &residual, config);
+            let whitening = Whitening::new(covariance)?;
+            let noise = match member.history.step.smoothing.as_ref() {
+                Some(smoothing) if member.contributes && !inputs.is_empty() => {
+                    let own = OwnPart::of(problem_now, member, &here, &whitening)?;
+                    Some(input_noise(
+                        problem_now,
+                        &inputs,
+                        (&member.history, smoothing),
+                        (&whitening, &own),
+                        &|moved| linearised(moved, Wanted::Readings, Some(&here)),
+                    )?)
+                }
+                _ => None,
+            };
+            Some((whitening, noise))
+        });
+        for (i, found) in places.iter().zip(found) {
+            let (whitening, noise) = found?;
+            problem.members[*i].whitening = whitening;
+            if let Some((slopes, square)) = noise {
+                sum.slope.iter_mut().zip(slopes).for_each(|(sum, own)| *sum += own);
+                sum.square += square;
+            }
         }
     }
     problem.input_noise = sum;
@@ -209,8 +214,15 @@ fn responses(
     DMatrix::from_columns(&columns)
 }
 
-/// The covariance that a step's rows have before anything is fitted.
-pub(crate) fn start(step: &StepRows, rows: usize, config: &IdentifyConfig) -> Option<Whitening> {
+/// Sets the whitening that each step has before anything is fitted.
+pub(crate) fn begin(problem: &mut Problem<'_>, config: &IdentifyConfig) -> Option<()> {
+    for member in &mut problem.members {
+        member.whitening = start(member.history.step, member.measured_k.len(), config)?;
+    }
+    Some(())
+}
+
+fn start(step: &StepRows, rows: usize, config: &IdentifyConfig) -> Option<Whitening> {
     let noise_k = |channel: Channel| config.sensor(channel).noise_sigma.max(usual_noise_k());
     let count = step.rows.len();
     let mut covariance = DMatrix::zeros(rows, rows);

@@ -8,6 +8,7 @@ use mapper_core::{Channel, Recording, Series, Window, is_reading};
 use mapper_numerics::coloured_noise::covariance_of_means;
 use mapper_numerics::statistics::mean;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// Rounding error of the time of a sample, s. Source: recordings store nanoseconds; half of one.
 pub(crate) const TIME_ROUNDING_S: f64 = 5e-10;
@@ -21,6 +22,11 @@ pub(crate) const COARSER: f64 = 2.0;
 /// Number of blocks after that time in a long window. Bound: the cost of a step grows with the cube of its rows, and a housing's time constant
 /// of minutes has dozens of them.
 const MAX_LATE_BLOCKS: f64 = 60.0;
+/// Minimum number of them. Bound: a housing's exponential over a window, and settling before it.
+const MIN_LATE_BLOCKS: f64 = 12.0;
+/// Rows of T2 in all steps of a recording, above which its steps have fewer late blocks. Bound: 160 steps of full length; of 300 steps, the
+/// covariances then take 20 MB instead of 90, and no interval of theirs changes by more than a tenth.
+const MAX_ROWS: f64 = 16_384.0;
 /// Gap between two rows above which the other parts of the housing start settled, s. Bound: twenty time constants of a wall of a few hundred J/K behind 15
 /// W/K are longer, but the operating point in a gap is not known.
 pub(crate) const MAX_ROW_GAP_S: f64 = 5.0;
@@ -79,7 +85,7 @@ pub(crate) fn condensed(
     end_state: &EndState,
     config: &IdentifyConfig,
 ) -> Option<StepRows> {
-    let step = recording.steps.get(position)?;
+    let (step, steps) = (recording.steps.get(position)?, recording.steps.len());
     let first_s = samples.rows.first()?.t_s;
     let length_s = samples.rows.last()?.t_s - first_s;
     let rows_of = |samples: &Samples, block_s: &dyn Fn(f64) -> f64| {
@@ -97,7 +103,7 @@ pub(crate) fn condensed(
         (rows, blocks)
     };
     let (mut lead, _) = rows_of(before, &|_| BLOCK_S);
-    let (mut rows, blocks) = rows_of(samples, &|elapsed_s| block_s_after(elapsed_s, length_s, config));
+    let (mut rows, blocks) = rows_of(samples, &|elapsed_s| block_s_after(elapsed_s, length_s, steps, config));
     let t_s: Vec<f64> = samples.rows.iter().map(|row| row.t_s).collect();
     let times: Vec<&[f64]> = blocks.into_iter().map(|block| &t_s[block]).collect();
     let smoothing = (!config.declared.is_empty()).then(|| smooth(&mut rows));
@@ -169,13 +175,14 @@ fn row(
     }
 }
 
-/// Length of a block that starts at this time after the first sample of a window, s.
-pub(crate) fn block_s_after(elapsed_s: f64, length_s: f64, config: &IdentifyConfig) -> f64 {
+/// Length of a block that starts at this time after the first sample of a window, s, in a recording of so many steps.
+pub(crate) fn block_s_after(elapsed_s: f64, length_s: f64, steps: usize, config: &IdentifyConfig) -> f64 {
     if elapsed_s < FOLLOWED_S {
         return BLOCK_S;
     }
     let shortest_s = if config.declared.is_empty() { BLOCK_S } else { COARSER * BLOCK_S };
-    shortest_s.max((length_s - FOLLOWED_S) / MAX_LATE_BLOCKS)
+    let rows = MAX_ROWS / steps.max(1) as f64 - FOLLOWED_S / BLOCK_S;
+    shortest_s.max((length_s - FOLLOWED_S) / rows.clamp(MIN_LATE_BLOCKS, MAX_LATE_BLOCKS))
 }
 
 /// Smooths T1, Tc, P1, P2, flow, the temperatures around the housing and the map position.
@@ -272,18 +279,24 @@ pub(crate) struct Basis {
     pub(crate) slopes: DMatrix<f64>,
 }
 
-/// The functions of each channel.
+/// The functions of each channel; some channels have the same.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Smoothing {
-    pub(crate) channels: [Basis; SMOOTHED_COUNT],
+    pub(crate) channels: [Arc<Basis>; SMOOTHED_COUNT],
 }
 
 impl Smoothing {
     /// The functions for rows at these times.
     pub(crate) fn new(t_s: &[f64]) -> Self {
-        Smoothing {
-            channels: std::array::from_fn(|channel| Basis::new(t_s, DEGREES[channel], SETTLING_S[channel])),
+        let mut smoothing = Smoothing::default();
+        for channel in 0..SMOOTHED_COUNT {
+            let form = |channel: usize| (DEGREES[channel], SETTLING_S[channel]);
+            smoothing.channels[channel] = match (0..channel).find(|known| form(*known) == form(channel)) {
+                Some(known) => smoothing.channels[known].clone(),
+                None => Arc::new(Basis::new(t_s, DEGREES[channel], SETTLING_S[channel])),
+            };
         }
+        smoothing
     }
 }
 

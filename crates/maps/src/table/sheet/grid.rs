@@ -176,7 +176,9 @@ impl Grid {
 }
 
 fn split_comment(line: &str) -> (&str, &str) {
-    let line = line.trim();
+    // Between tabs the first cell may be empty.
+    let is_indented = !line.trim().contains('\t');
+    let line = if is_indented { line.trim() } else { line.trim_end().trim_start_matches(' ') };
     // In a row of units `%` may be the unit of an efficiency.
     let is_unit = line.strip_prefix('%').is_some_and(|rest| rest.starts_with([',', ';', '\t']));
     let marks = ["!", "%", "//", "#"];

@@ -7,6 +7,7 @@ use mapper_core::ImportRemark;
 use mapper_core::unit_factors::RPM_PER_KRPM;
 use mapper_table::{
     ColumnName, Word, bare_unit, header_unit, is_dimensionless, is_missing_mark, is_unit, is_units_row,
+    with_unknown_units,
 };
 use mapper_yaml::units::{Kind, Unit};
 use std::ops::RangeInclusive;
@@ -40,7 +41,7 @@ impl Headings {
         let found = below.or_else(above);
         let unknown_row = grid.rows.get(index + 1).filter(|row| found.is_none() && is_unknown(row));
         let unknown_row = unknown_row.map(GridRow::text);
-        let (first_row, cells) = found.unwrap_or_else(|| (index + 1, names.clone()));
+        let (first_row, cells) = found.unwrap_or_else(|| (index + 1, with_unknown_units(&names)));
         Headings { cells, names, first_row, unknown_row }
     }
 

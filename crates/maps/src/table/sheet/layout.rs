@@ -197,13 +197,12 @@ fn heading_in_usual_order(
     Some(layout)
 }
 
-/// Whether to report a mistake in a row: a comment may contain any words.
+/// Whether to report a mistake in a row: a comment may contain any words, and two of them by chance.
 fn is_reported(described: &DescribedColumns, row: &GridRow, error: &ColumnError) -> bool {
-    let of_turbine = matches!(error, ColumnError::Turbine { .. });
-    if row.is_comment {
-        of_turbine && is_heading(described, row)
-    } else {
-        of_turbine || is_heading(described, row)
+    match (row.is_comment, error) {
+        (false, ColumnError::Turbine { .. }) => true,
+        (true, ColumnError::Unit { .. }) => named_cells(described, row) > 2,
+        _ => is_heading(described, row),
     }
 }
 
@@ -264,10 +263,17 @@ pub(crate) fn columns(described: &DescribedColumns, cells: &[String]) -> Result<
             None => columns.push(column),
         }
     }
+    let stated = columns.clone();
+    columns.iter_mut().for_each(|column| column.share_unit(&stated));
     Ok(columns)
 }
 
 pub(crate) fn is_heading(described: &DescribedColumns, row: &GridRow) -> bool {
+    named_cells(described, row) > 1
+}
+
+/// How many cells of a row without numbers name quantities.
+fn named_cells(described: &DescribedColumns, row: &GridRow) -> usize {
     let named = |cell: &&String| {
         cell.contains(char::is_alphabetic) && !matches!(column(0, cell, described.machine), Ok(None))
     };
@@ -275,7 +281,7 @@ pub(crate) fn is_heading(described: &DescribedColumns, row: &GridRow) -> bool {
     let is_number =
         |cell: &String| cell.contains(|c: char| c.is_ascii_digit()) && !cell.contains(char::is_alphabetic);
     let has_number = row.cells.iter().any(is_number);
-    !has_number && row.cells.iter().filter(named).count() >= 2
+    if has_number { 0 } else { row.cells.iter().filter(named).count() }
 }
 
 fn missing_quantity(described: &DescribedColumns, row: &GridRow) -> &'static str {

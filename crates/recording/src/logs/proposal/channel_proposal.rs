@@ -270,12 +270,12 @@ impl fmt::Display for ProposalRemark {
                 short(*value)
             ),
             Remark::OneUnitFits { unit, columns: 1 } => {
-                write!(f, "the log gives no unit; only {unit} is plausible")
+                write!(f, "the log gives no unit; of the usual ones, only {unit} is plausible")
             }
             Remark::OneUnitFits { unit, columns } => {
                 write!(
                     f,
-                    "the log gives no unit; only in {unit} all {columns} columns of this kind are plausible"
+                    "the log gives no unit; of the usual ones, only in {unit} all {columns} columns of this kind are plausible"
                 )
             }
             Remark::NoUnitFits { min, max } => {

@@ -221,7 +221,7 @@ fn own_deviation(channel: Channel, reading: f64) -> f64 {
 }
 
 /// Sizes of the deviations of the operating points, relative to those of a model within tolerance.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct OwnFactors {
     pub all: f64,
     /// Further factor of the turbine side, whose slow variations it scales too.

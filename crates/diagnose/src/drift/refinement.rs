@@ -24,17 +24,28 @@ pub(crate) struct Refinement {
 }
 
 impl Refinement {
-    /// Decides and fits, and repeats both with the result in the model. Keeps the last result that the model can follow.
+    /// Decides and fits, and repeats both with the result in the model. Keeps the last result that the model can follow. A drift must also be found
+    /// with deviations of the operating points as large as they show.
     pub(super) fn new(
         readings: Readings,
         own: &[DMatrix<f64>],
         drives: &mut [Drive<'_>],
         declared: &Declared,
     ) -> Result<Refinement, DriftError> {
-        let factors = own_factors(&readings, own, declared)?;
-        let mut refined = Refinement::of(readings, own, (declared, factors), &[])?;
+        let within = OwnFactors { all: OWN_FACTORS[0], turbine: OWN_FACTORS[0] };
+        let mut refined = Refinement::of(readings, own, (declared, within), &[])?;
+        if refined.fits.drifts.is_empty() {
+            return Ok(refined);
+        }
+        let factors = own_factors(&refined.readings, own, (declared, within))?;
+        if factors != within {
+            let shown = Refinement::of(refined.readings.clone(), own, (declared, factors), &[])?;
+            if shown.fits.drifts.is_empty() {
+                return Ok(shown);
+            }
+        }
         for _ in 0..ROUNDS {
-            match refined.refine(own, drives, (declared, factors)) {
+            match refined.refine(own, drives, (declared, within)) {
                 Some(better) => refined = better,
                 None => break,
             }
@@ -112,11 +123,10 @@ const OWN_FACTORS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
 fn own_factors(
     readings: &Readings,
     own: &[DMatrix<f64>],
-    declared: &Declared,
+    (declared, within): (&Declared, OwnFactors),
 ) -> Result<OwnFactors, DriftError> {
     let candidates = Candidates::new(readings, &[])?;
     let mut own = own.to_vec();
-    let within = OwnFactors { all: OWN_FACTORS[0], turbine: OWN_FACTORS[0] };
     // A segment that the model cannot follow says nothing about the others.
     leave_out(&mut own, readings, &constants_and_columns(readings, declared, within).1, &candidates)?;
     let ln_likelihood = |factors: OwnFactors| -> Result<f64, DriftError> {

@@ -119,7 +119,7 @@ fn constants_and_columns(
 const OWN_FACTORS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
 
 /// The factors on the deviations of the operating points under which the readings are most probable, each with its best explanation: a cause of the
-/// gap that acts all the time moves each operating point by more than tolerances do, and is no drift.
+/// gap that acts all the time moves each operating point by more than tolerances do, without drift.
 fn own_factors(
     readings: &Readings,
     own: &[DMatrix<f64>],
